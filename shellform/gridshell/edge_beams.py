@@ -126,8 +126,8 @@ class EdgeBeam:
 
 def edge_beams(net: Net, edge: EdgeBeam | None, rod: BeamStiffness) -> Beams | None:
     """The elements of the net's edge beams, then their clamps, no stiffer than a `rod` half the gap long;
-    None where it has none. Raises InputError where the net has edge beams, but
-    nothing is said of what they are."""
+    None where it has none. Raises InputError where the net has edge beams, but nothing is said of what they
+    are."""
     if not net.edges:
         return None
     if edge is None:

@@ -49,10 +49,10 @@ class Region:
         if self.half is not None:
             require_number(self.half, where="load.half", give=_ANGLE)
         if self.strip is not None:
-            _numbers("strip", self.strip, f"{_ANGLE}, and two places along it, m")
+            _numbers("strip", self.strip, 3, f"{_ANGLE}, and two places along it, m")
             require_number(self.strip[0], where="load.strip[0]", give=_ANGLE)
         if self.ring is not None:
-            _numbers("ring", self.ring, "two levels, m")
+            _numbers("ring", self.ring, 2, "two levels, m")
         for name, limits in [("strip", self.strip and self.strip[1:]), ("ring", self.ring)]:
             if limits and not limits[0] < limits[1]:
                 raise InputError(
@@ -288,16 +288,14 @@ def _positive(name: str, value: float) -> float:
 
 
 _ANGLE = "a direction in plan in radians, such as 1.57"
-_LENGTHS = {"strip": 3, "ring": 2}
 
 
-def _numbers(name: str, given: object, give: str) -> None:
-    """Raises InputError for what aren't as many numbers as are needed; infinite ones are no limit."""
+def _numbers(name: str, given: object, count: int, give: str) -> None:
+    """Raises InputError for what aren't so many numbers; infinite ones are no limit."""
     try:
         found = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
         found = np.empty(0)
-    if found.shape != (_LENGTHS[name],) or np.isnan(found).any():
-        raise InputError(
-            f"must be {_LENGTHS[name]} numbers", where=f"load.{name}", value=given, remedy=f"Give {give}."
-        )
+    if found.shape != (count,) or np.isnan(found).any():
+        what, remedy = f"must be {count} numbers", f"Give {give}."
+        raise InputError(what, where=f"load.{name}", value=given, remedy=remedy)

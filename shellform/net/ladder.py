@@ -81,8 +81,8 @@ def climbed_net(
     progress: Callable[[str], None] = lambda text: None,
     watch: Pulling | None = None,
 ) -> tuple[Net, Attempt]:
-    """The net with the `settings` at the `angle`, rad, and `offset`, or the first on the ladder,
-    turned by at most `tolerance`, rad; and the attempt that gave it.
+    """The net with the `settings` at the `angle`, rad, and `offset`, or the first on the ladder, turned by at
+    most `tolerance`, rad; and the attempt that gave it.
 
     `most`: factorisations of pulls that fail, all rungs together; `failed`: what the first rung is known to
     end with; `near`: whether rods may be bent so much that crossings come nearer than their spacing. Raises

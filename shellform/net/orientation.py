@@ -68,8 +68,8 @@ def oriented_net(
     workers: int = 2,
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[Net, float, tuple[float, float]]:
-    """The net with the `settings` at the `angle`, rad, and `offset`, or at those that
-    `best_orientation` finds, or the first on the ladder from there; and which these are."""
+    """The net with the `settings` at the `angle`, rad, and `offset`, or at those that `best_orientation`
+    finds, or the first on the ladder from there; and which these are."""
     if angle == "auto":
         best, _ = best_orientation(surface, settings, workers=workers, progress=progress)
         angle, offset = best.angle, best.offset

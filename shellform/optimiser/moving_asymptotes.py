@@ -38,7 +38,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.convex import minimise
-from shellform.optimiser.optimum import Checkpoint, Optimum, Step, largest, summed
+from shellform.optimiser.optimum import Checkpoint, Optimum, Step, largest, terms_by_name
 from shellform.optimiser.solver import check_settings
 from shellform.optimiser.trials import reach, staged
 from shellform.problem.evaluation import COUNTS, Evaluated, Evaluator, Linearisation, OffBranch
@@ -295,10 +295,7 @@ def _step(search: _Search, point: Evaluated, accepted: bool) -> Step:
     return Step(
         evaluation=search.evaluator.evaluations,
         objective=point.objective,
-        terms=summed(
-            (problem.column(part.term), float(value))
-            for part, value in zip(problem.minimise, point.terms, strict=True)
-        ),
+        terms=terms_by_name(problem, point.terms),
         constraints=largest(
             (problem.column(part.term), float(point.constraints[own].max(initial=-np.inf)))
             for part, own in zip(problem.constraints, problem.places(), strict=True)

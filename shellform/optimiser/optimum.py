@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design
 from shellform.problem.problem import Problem
@@ -112,11 +113,12 @@ class Optimum:
         return {name: loaded.equilibrium.state for name, loaded in self.loaded.items()}
 
 
-def summed(named: Iterable[tuple[str, float]]) -> dict[str, float]:
-    """Values by name, those of one name added up."""
+def terms_by_name(problem: Problem, values: Reals) -> dict[str, float]:
+    """The values (t,) of the objective's terms by their columns' names, those of one name added up."""
     found: dict[str, float] = {}
-    for name, value in named:
-        found[name] = found.get(name, 0.0) + value
+    for part, value in zip(problem.minimise, values, strict=True):
+        name = problem.column(part.term)
+        found[name] = found.get(name, 0.0) + float(value)
     return found
 
 

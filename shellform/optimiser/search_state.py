@@ -14,7 +14,7 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.guards import Guard, solved_guard, whole_guard
-from shellform.optimiser.optimum import Checkpoint, Optimum, Step, largest, summed
+from shellform.optimiser.optimum import Checkpoint, Optimum, Step, largest, terms_by_name
 from shellform.optimiser.solver import SequentialConvex
 from shellform.optimiser.step_model import StepModel, step_model
 from shellform.problem.constraints import AtLeast, Constraint, residuals
@@ -333,10 +333,6 @@ def noted(search: Search, it: Iterate, point: Evaluated, accepted: bool) -> Iter
 def record(search: Search, point: Evaluated, stage: float, accepted: bool, phase: str) -> Step:
     """A trial as a step of the history, told to who watches."""
     problem, pull = search.evaluator.problem, tensions(search, point)
-    terms = summed(
-        (problem.column(part.term), float(value))
-        for part, value in zip(problem.minimise, point.terms, strict=True)
-    )
     most = np.array([pull.max(initial=0.0)])
     limits = [(problem.column(part.term), float(residuals(part, most)[0])) for part in search.bounded]
     limits += [
@@ -347,7 +343,7 @@ def record(search: Search, point: Evaluated, stage: float, accepted: bool, phase
     step = Step(
         evaluation=search.evaluator.evaluations,
         objective=point.objective,
-        terms=terms,
+        terms=terms_by_name(problem, point.terms),
         constraints=largest(limits),
         cables=int((pull > 0.0).sum()),
         stage=stage,

@@ -197,17 +197,17 @@ def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: B
     def worst(value: Callable[[LoadRecord], float | None]) -> Callable[[DesignRecord], float | None]:
         return lambda row: _largest(value(each) for each in row.loads.values())
 
-    limits = [
-        _Limit(
-            "Largest cable force under the design load and those beyond it (5)",
-            "cable.force_max",
-            bounds.force,
-            lambda row: (
-                _largest(each.cable_force_max for load, each in row.loads.items() if load != "none")
-                or row.cable_force_max
-            ),
-            "N",
+    pulled = _Limit(
+        "Largest cable force under the design load and those beyond it (5)",
+        "cable.force_max",
+        bounds.force,
+        lambda row: (
+            _largest(each.cable_force_max for load, each in row.loads.items() if load != "none")
+            or row.cable_force_max
         ),
+        "N",
+    )
+    limits = [
         _Limit(
             "Largest deviation under the design load",
             "limits.deviation",
@@ -255,8 +255,11 @@ def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: B
             "N",
         ),
     ]
-    found = [_at_most(each, each.most, rows, designs) for each in limits if each.most is not None]
-    found[1:1] = _pulled_before(rows, designs, bounds.force)
+    found = [
+        _at_most(pulled, bounds.force, rows, designs),
+        *_pulled_before(rows, designs, bounds.force),
+        *(_at_most(each, each.most, rows, designs) for each in limits if each.most is not None),
+    ]
     if bounds.slack is not None:
         found += [_taut(rows, designs, load, bounds.slack) for load in bounds.slack_loads]
     return found

@@ -139,11 +139,10 @@ def before_load_words(designs: Mapping[str, DesignRecord], name: str, limit: flo
     row = designs[name].loads.get("none") if name in designs else None
     if row is None:
         return ""
-    found = []
-    if exceeds(row.cable_force_max, limit):
-        pull, most = (number(each) for each in (row.cable_force_max or 0.0, limit or 0.0))
+    found, pull = [], row.cable_force_max
+    if pull is not None and limit is not None and exceeds(pull, limit):
         found.append(
-            f"a cable pulls {pull} N, more than the {most} N of cable.force_max, which counts under load"
+            f"a cable pulls {number(pull)} N, more than the {number(limit)} N of cable.force_max, which counts under load"
         )
     if row.slack:
         found.append(f"{listed(row.slack)} {'hangs' if len(row.slack) == 1 else 'hang'} slack")
@@ -158,15 +157,15 @@ def above_words(row: LoadRecord | None, limit: float | None) -> str:
         return ""
     more = (
         f", more than the {number(limit)} N that it may pull under load"
-        if limit and exceeds(pull, limit)
+        if limit is not None and exceeds(pull, limit)
         else ""
     )
     return f"{number(pull)} N at most before any load{more}"
 
 
-def exceeds(pull: float | None, limit: float | None) -> bool:
-    """Whether a cable pulls more than the limit, both known, by what is told of them."""
-    return pull is not None and limit is not None and pull > limit and number(pull) != number(limit)
+def exceeds(pull: float, limit: float) -> bool:
+    """Whether a cable pulls more than the limit by what is told of both."""
+    return pull > limit and number(pull) != number(limit)
 
 
 def shape_notes(summary: Summary, name: str) -> list[str]:

@@ -39,7 +39,7 @@ from shellform.reliability.failure import explained
 from shellform.reliability.first_order import moved_by_cause
 from shellform.reliability.guide import guide
 from shellform.reliability.path_of_one import SOUGHT
-from shellform.reliability.perfect import TO_ITS_END, perfect
+from shellform.reliability.perfect import perfect
 from shellform.reliability.probability import counted
 from shellform.reliability.refinement import mesh_error
 from shellform.reliability.safety import paths
@@ -282,7 +282,7 @@ def _built_shape(path: DrawnPath, each: Examined, seed: int) -> BuiltShapeRecord
         return None
     largest = [each.deviation_max for each in path.shapes]
     means = [each.deviation_mean for each in path.shapes]
-    nominal = perfect(each.shell, each.design, each.loads["design"], step=TO_ITS_END)
+    nominal = each.nominal("design")
     return BuiltShapeRecord(
         len(largest),
         float(np.median(largest)),

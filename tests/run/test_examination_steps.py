@@ -254,10 +254,13 @@ def test_the_guide_is_told_of_loads_to_which_the_perfect_path_leads(monkeypatch)
 
 
 def test_of_the_shapes_as_built_medians_and_the_worst_are_told(monkeypatch):
-    monkeypatch.setattr(examination, "perfect", lambda *_, **__: "nominal")
-    monkeypatch.setattr(
-        examination, "moved_by_cause", lambda nominal, tolerances, *, seed: {"marks": 0.001 * seed}
-    )
+    monkeypatch.setattr(Examined, "nominal", lambda self, load: f"nominal under {load}")
+
+    def moved(nominal, tolerances, *, seed):
+        assert nominal == "nominal under design"
+        return {"marks": 0.001 * seed}
+
+    monkeypatch.setattr(examination, "moved_by_cause", moved)
     shapes = tuple(
         DrawnShape(number, most, mean)
         for number, most, mean in ((0, 0.05, 0.02), (1, 0.09, 0.01), (2, 0.04, 0.03), (4, 0.06, 0.015))
