@@ -105,6 +105,7 @@ def tell_as_built(summary: Summary) -> None:
         built_shape_words,
         cause_title,
         critical_words,
+        goes_slack_words,
         rare_words,
         shape_notes,
         standing_words,
@@ -133,8 +134,8 @@ def tell_as_built(summary: Summary) -> None:
                 print(f"{note}.")
     found = summary.failure
     if found is not None:
-        slack = "goes slack" if len(found.cables) == 1 else "go slack"
-        cables = f"; {', '.join(found.cables)} {slack}" if found.cables else ""
+        slack = goes_slack_words(found.cables)
+        cables = f"; {slack}" if slack else ""
         print(
             f"fails first: structure {found.number} at {found.factor:.2f} of the load “{found.load}” ({found.kind}), "
             f"driven by {cause_title(found.driver)}, without which it bears {found.without[found.driver]:.2f}{cables}"

@@ -133,6 +133,11 @@ def listed(names: Sequence[str], most: int = 8) -> str:
     )
 
 
+def goes_slack_words(cables: Sequence[str]) -> str:
+    """Which cables go slack on the way; "" where none does."""
+    return f"{', '.join(cables)} {'goes' if len(cables) == 1 else 'go'} slack" if cables else ""
+
+
 def before_load_words(designs: Mapping[str, DesignRecord], name: str, limit: float | None) -> str:
     """How much a cable of the design pulls before any load, where that is more than the `limit`, N, which
     counts under load (None: not known), and which cables hang slack then; "" where there is neither."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shellform.records import words
 from shellform.records.as_built import AsBuilt, critical_checks, falls, guide_checks, standing_checks
 from shellform.records.check import SLACK, Cell, Check, below, share_of
 from shellform.records.checks import Bounds, checks
@@ -486,3 +487,9 @@ def test_of_designs_that_fail_the_later_one_is_built_where_no_check_has_become_w
 def test_before_anything_is_optimised_the_initial_design_is_to_be_built_or_the_last_there_is():
     assert to_build([], ["unbraced", "initial", "unloaded"]) == "initial"
     assert to_build([], ["one", "two", "three"]) == "three"
+
+
+def test_one_cable_goes_slack_and_several_go():
+    assert words.goes_slack_words(("C5",)) == "C5 goes slack"
+    assert words.goes_slack_words(("C3", "C12")) == "C3, C12 go slack"
+    assert words.goes_slack_words(()) == ""

@@ -92,6 +92,7 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         ),
         "failure": summary.failure,
         "failure_driver": "" if summary.failure is None else words.cause_title(summary.failure.driver),
+        "failure_slack": "" if summary.failure is None else words.goes_slack_words(summary.failure.cables),
         "failure_load": "" if summary.failure is None else words.load_title(summary.failure.load),
         "rare": [(words.load_title(each.load), words.rare_words(each)) for each in summary.rare or ()],
         "designs": rows,
