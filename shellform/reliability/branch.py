@@ -10,11 +10,11 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
-from shellform.reliability.outlook import Outlook, View
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.equilibrium import TOLERANCE, TURN, find_equilibrium
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
+from shellform.structure.solve.outlook import KINK, WINDOW, Outlook, View
 from shellform.structure.solve.residual import STAGNANT, ResidualNorm, held
 
 STRAY = 0.01  # of the span from where a step was expected to end: the state belongs to another branch
@@ -22,9 +22,9 @@ ON_THE_WAY = 1e-5  # residual of states between, from which the next step starts
 _PATIENCE = 10  # factorisations of one step
 _FAR_OFF = 5.0  # rad, a step that leads nowhere
 _EASED, _HALF = 0.1, 0.5  # of a mass that is left after a step, at first and at most
-_KINK = 1 / 64  # of the load, a step so short may turn by a cable's kink: it counts where it leads back …
-_RETURNED, _BACK = 0.1, 60  # … to within this share of its way, in so many factorisations
-_WINDOW = 1 / 512  # of the load, a step so short may pass over bifurcations that lie within it
+# A step that turns and is as short as a kink counts where it leads back to within a share of its way, in so
+# many factorisations.
+_RETURNED, _BACK = 0.1, 60
 _LEAST, _MOST = 0.01, 1e4  # of the first mass: less is none, and more leads nowhere
 
 Foreseen = tuple[Reals, ...] | None  # deformations of each part of beams
@@ -88,21 +88,21 @@ class Branch:
         `here` at the `factor` on; `report` is told each one's load factor and state. `heeding`: steps that
         may pass over an unstable stretch are halved (outlook.py)."""
         width, good = step, 0
-        outlook = Outlook(self.assembly, self.load, self.span, self.measure.mass_shape) if heeding else None
-        view = None if outlook is None else outlook.view(here.state, here.balance, here.factor, factor, None)
+        outlook = Outlook(self.assembly, self.span, self.measure.mass_shape) if heeding else None
+        view = None if outlook is None else self._view(outlook, here, None)
         while factor < most:
             goal = most if factor + width > most - 1e-12 else factor + width
             there = self.step(here, goal, last=goal == most)
             onward = None
             if there is not None and outlook is not None and view is not None:
-                onward = outlook.view(there.state, there.balance, there.factor, goal, view)
-                there = self._heeded(outlook, view, onward, there)
+                onward = self._view(outlook, there, view)
+                there = self._heeded(outlook, view, onward, there, (factor, goal))
             if there is None:
                 width, good = 0.5 * width, 0
                 again = self.at(here.state)  # its factor was replaced
                 assert again is not None
                 here = again
-                if width < (smallest if onward is None else min(smallest, _WINDOW)):
+                if width < (smallest if onward is None else min(smallest, WINDOW)):
                     break
                 continue
             here, factor, view, good = there, goal, onward, good + 1
@@ -112,26 +112,32 @@ class Branch:
                 width, good = min(2.0 * width, step), 0
         return here, factor
 
-    def _heeded(self, outlook: Outlook, before: View, after: View, there: Here) -> Here | None:
-        """The state `there` to which a step has led from one view to the other; None where it may have passed
-        over an unstable stretch."""
-        width = after.factor - before.factor
-        if outlook.turns(before, after):
-            if width > _KINK or not self._returns(before, after):
+    def _view(self, outlook: Outlook, here: Here, before: View | None) -> View:
+        """What is to be seen from a state, by the load factor."""
+        assert here.balance.tangent is not None
+        onward = self.assembly.by_node(here.factor.solve(self.load.ravel()[self.assembly.free]))
+        return outlook.view(here.state, here.balance.tangent, here.factor, onward, before)
+
+    def _heeded(
+        self, outlook: Outlook, before: View, after: View, there: Here, factors: tuple[float, float]
+    ) -> Here | None:
+        """The state `there` to which a step has led from one view to the other, between load `factors`; None
+        where it may have passed over an unstable stretch."""
+        width = factors[1] - factors[0]
+        if outlook.turns(before, after, width):
+            if width > KINK or not self._returns(before, after, factors[0]):
                 return None
             return self.at(there.state)  # its factor was replaced
-        if width > _KINK and outlook.bends(before, after):
-            return None
-        return None if width > _WINDOW and outlook.sinks(before, after) else there
+        return None if outlook.passes_over(before, after, width, width) else there
 
-    def _returns(self, before: View, after: View) -> bool:
-        """Whether the structure comes back to the state before a step where its load is taken back: on one
-        branch it does, with all kinks that cables make. Both are brought to rest, for what is left
-        unbalanced ON_THE_WAY takes a soft structure far."""
+    def _returns(self, before: View, after: View, factor: float) -> bool:
+        """Whether the structure comes back to the state before a step where its load is taken back to the
+        `factor`: on one branch it does, with all kinks that cables make. Both are brought to rest, for what
+        is left unbalanced ON_THE_WAY takes a soft structure far."""
         places = []
         for state in (before.state, after.state):
             try:
-                rest = find_equilibrium(self.assembly, state, before.factor * self.load, limit=_BACK)
+                rest = find_equilibrium(self.assembly, state, factor * self.load, limit=_BACK)
             except NotConverged as error:
                 self.spent += error.iterations
                 return False

@@ -23,6 +23,7 @@ class Curve:
         self.load, self.negatives, self.most, self.iterations = load, negative, most, iterations
         self.moving = np.array([True])
         self.sizes, self.spent = [], 7
+        self.windows, self.looks = (), []
 
     def begun(self, goal, lead):
         self.led, self.direction = (
@@ -32,7 +33,7 @@ class Curve:
         return self
 
     def point(self, state, factor, iterations):
-        here = self.at(0.0)
+        here = self.at(state if isinstance(state, float) else 0.0)
         return replace(here, rate=abs(here.rate))
 
     def at(self, x, way=1.0):
@@ -40,7 +41,9 @@ class Curve:
         rate = (self.load(x + 1e-6) - self.load(x - 1e-6)) / 2e-6
         negative = self.negatives(x)
         found = Equilibrium(x, 0.0, 1e-9, 1, negative == 0, negative)
-        return OnPath(x, self.load(x), found, np.array([1.0 / rate]), way * rate, self.iterations, 0.0)
+        return OnPath(
+            x, self.load(x), found, np.array([1.0 / rate]), way * rate, self.iterations, 0.0, None, None
+        )
 
     def step(self, here, size):
         self.sizes.append(size)
@@ -64,12 +67,24 @@ class Curve:
             else:
                 high = middle
         found = self.at(high)
-        return OnPath(high, goal, found.equilibrium, found.tangent, found.rate, 4, 0.0)
+        return OnPath(high, goal, found.equilibrium, found.tangent, found.rate, 4, 0.0, None, None)
 
     def by_load(self, here, end):
         return None
 
+    def view(self, here, before):
+        """Its place, for windows that are told by that."""
+        return here.state if here.equilibrium.stable else None
+
+    def heeded(self, here, seen, there, *, critical=False):
+        assert seen == here.state
+        self.looks.append((here.state, there.state, critical))
+        if any(here.state <= low and there.state >= high for low, high in self.windows):
+            raise Missed
+        return there.state
+
     located = Walk.located
+    share = Walk.share
     gave_up = Walk.gave_up
 
 
@@ -319,3 +334,51 @@ def test_the_rate_of_a_path_s_first_point_has_the_sign_of_its_direction(monkeypa
         assert points[0].rate == pytest.approx(np.copysign(2.0, first))
     pulled = followed(monkeypatch, Curve(lambda x: 2.0 * x, iterations=1), goal=-0.3, first=1.0)
     assert pulled[0].rate == pytest.approx(-2.0)
+
+
+def test_a_heeded_path_cuts_steps_that_may_pass_over_something_until_it_is_met(monkeypatch):
+    """Unstable from 0.61 to 0.63, between two steps of 0.15, and foretold from either side."""
+    for heeding, events in ((False, []), (True, ["bifurcation", "bifurcation"])):
+        curve = Curve(lambda x: 2.0 * x, lambda x: int(0.61 < x < 0.63))
+        curve.windows = ((0.61, 0.63),)
+        points = followed(monkeypatch, curve, goal=3.0, heeding=heeding)
+        found = [each for each in points if each.event]
+        assert [each.event for each in found] == events
+        assert points[-1].factor == 3.0
+    assert found[0].factor == pytest.approx(1.22, rel=1e-6)
+
+
+def test_up_to_an_event_a_heeded_path_is_looked_at_as_well(monkeypatch):
+    """Unstable from 0.61 to 0.63 and from 0.7 on: the step ends beyond both, and where bisection meets the
+    second one, the first lies before it."""
+    curve = Curve(lambda x: 2.0 * x, lambda x: int(0.61 < x < 0.63 or x > 0.7))
+    curve.windows = ((0.61, 0.63),)
+    told = [
+        next(
+            each.factor
+            for each in followed(monkeypatch, curve, goal=3.0, first=0.4, heeding=heeding)
+            if each.event
+        )
+        for heeding in (False, True)
+    ]
+    assert told == pytest.approx([1.4, 1.22], rel=1e-6)
+    begin, end, _ = next(look for look in curve.looks if look[2])
+    assert begin == pytest.approx(0.6)
+    assert end == pytest.approx(0.7, abs=1e-4)
+
+
+def test_where_no_step_leads_to_an_event_a_heeded_one_is_cut_to_a_512th_of_the_load(monkeypatch):
+    curve = Curve(lambda x: 2.0 * x, lambda x: int(x > 0.71), iterations=1)
+    curve.located = lambda here, size, there: None
+    for heeding, told in ((False, 2.1), (True, 1.42)):
+        points = followed(monkeypatch, curve, goal=3.0, heeding=heeding)
+        first = next(each.factor for each in points if not each.equilibrium.stable)
+        assert first == pytest.approx(told, rel=1 / 512)
+
+
+def test_a_change_of_the_load_is_a_share_of_the_larger_of_both_and_of_the_first_step_s():
+    walk = SimpleNamespace(first=0.5)
+    points = [SimpleNamespace(factor=each) for each in (0.0, 0.1, -2.0, -1.5)]
+    assert Walk.share(walk, points[0], points[1]) == pytest.approx(0.2)
+    assert Walk.share(walk, points[2], points[3]) == pytest.approx(0.25)
+    assert Walk.share(walk, points[3], points[2]) == pytest.approx(0.25)

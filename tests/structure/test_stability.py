@@ -213,7 +213,10 @@ def test_the_critical_load_is_the_first_event_of_the_path_with_its_softest_mode(
         ("at 0.5", "at 1.0", (0.5, 1.0)),
     ]
     assert asked["modes"] == ("fit for at 1.4", "at 1.4", 1)
-    assert asked["follow"] == (("assembly", "start", "drive"), {"goal": 4.0, "first": 0.1, "tolerance": 1e-5})
+    assert asked["follow"] == (
+        ("assembly", "start", "drive"),
+        {"goal": 4.0, "first": 0.1, "tolerance": 1e-5, "heeding": True},
+    )
 
 
 def test_a_point_that_is_unstable_without_an_event_is_a_bifurcation_s_and_a_stable_path_has_no_critical_load(

@@ -158,7 +158,7 @@ def critical_load(
     InputError where the start is unstable.
     """
     linearised, before = np.inf, None
-    for point in follow(assembly, start, drive, goal=goal, first=first, tolerance=tolerance):
+    for point in follow(assembly, start, drive, goal=goal, first=first, tolerance=tolerance, heeding=True):
         found = point.equilibrium
         if before is None and not found.stable:
             raise InputError(

@@ -31,12 +31,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.structure.elements.state import State, extended
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import TOLERANCE
 from shellform.structure.solve.extended import with_twice_the_digits
 from shellform.structure.solve.loading import Drive, kinked, turns_between
+from shellform.structure.solve.outlook import WINDOW, View
 from shellform.structure.solve.residual import ResidualNorm
 from shellform.structure.solve.walk import Doubted, Lead, Missed, OnPath, PathPoint, Walk
 
@@ -59,19 +61,18 @@ def follow(
     most: int = MOST,
     tolerance: float = TOLERANCE,
     events: bool = True,
+    heeding: bool = False,
 ) -> Iterator[PathPoint]:
     """The points of the path from the equilibrium `start` at factor 0, one by one.
 
     It ends when the factor comes to `goal` for the first time. With a `lead` that degree of freedom is led
     instead, up to its displacement. `first`: the first step, as a share of the goal or of the led
     displacement; `most` points. With `events` limit points and bifurcations are located and given as points
-    of their own. Raises NotConverged with the last state where no step succeeds or the points run out,
+    of their own; `heeding`: steps from a stable point that may pass over an unstable stretch are cut
+    (outlook.py). Raises NotConverged with the last state where no step succeeds or the points run out,
     InputError for a held degree of freedom as lead.
     """
-    precise = with_twice_the_digits(assembly)
-    load, measure = drive.at(goal), ResidualNorm(assembly)
-    if precise is not None and measure.drowns(assembly.evaluate(start), start, load, tolerance):
-        assembly, start = precise, extended(start)
+    assembly, start = _with_digits(assembly, start, drive.at(goal), tolerance)
     walk = Walk(assembly, start, drive, tolerance, goal, lead)
     here = walk.point(start, 0.0, 0)
     if lead is not None:
@@ -89,9 +90,10 @@ def follow(
             remedy="Give a load factor other than 0, and a load that moves a free node.",
         )
     yield here.point()
+    walk.first = abs(size * here.rate)
+    view = walk.view(here, None) if heeding else None
     smallest, largest = _SMALLEST * abs(size), _SHORTEST * abs(size)
-    began = False
-    doubted: Doubted = None
+    began, doubted = False, None
     for _ in range(most):
         try:
             size, there = _onward(walk, here, size, smallest, doubted, began=began)
@@ -99,6 +101,7 @@ def follow(
             crossing = (here.factor - goal) * (there.factor - goal) <= 0.0 and there.factor != here.factor
             if lead is None and crossing:
                 there = walk.at_factor(here, there, goal)
+            seen, event = _events(walk, here, view, size, there) if events else (None, None)
         except Missed as missed:
             doubted = missed.doubted or doubted
             size *= _SHORTEST
@@ -110,10 +113,9 @@ def follow(
             there, doubted = beyond, None
             way = float(np.linalg.norm(walk.between(here.state, there.state)))
             size = float(np.copysign(min(largest, max(way, smallest)), size))
-        if events and there.negative != here.negative:
-            event = walk.located(here, size, there)
-            if event is not None:
-                yield event
+            event, seen = None, walk.view(there, view) if heeding else None
+        if event is not None:
+            yield event
         yield there.point()
         if lead is None:
             if there.factor == goal:
@@ -124,8 +126,35 @@ def follow(
         if lead is not None:
             left = lead[2] - walk.displacement(there.state, lead)
             size = float(np.sign(left)) * min(abs(size), abs(left))
-        here, began = there, True
+        here, view, began = there, seen, True
     raise walk.gave_up(here, f"The path did not come to its end within {most} points")
+
+
+def _with_digits(assembly: Assembly, start: State, load: Reals, tolerance: float) -> tuple[Assembly, State]:
+    """The assembly and its state, with twice the digits where rounding would hide the load."""
+    precise = with_twice_the_digits(assembly)
+    if precise is None or not ResidualNorm(assembly).drowns(assembly.evaluate(start), start, load, tolerance):
+        return assembly, start
+    return precise, extended(start)
+
+
+def _events(
+    walk: Walk, here: OnPath, view: View | None, size: float, there: OnPath
+) -> tuple[View | None, PathPoint | None]:
+    """What is to be seen from `there`, where the step is heeded, since there is a `view` from `here`; and the
+    point of the step where the number of negative eigenvalues changes, if it does. Raises Missed where it may
+    have passed over an unstable stretch."""
+    if view is not None and there.equilibrium.stable:
+        return walk.heeded(here, view, there), None
+    found = None if there.negative == here.negative else walk.located(here, size, there)
+    if view is not None:
+        if found is None and walk.share(here, there) > WINDOW:
+            raise Missed
+        if found is not None and found[1] is not here:
+            last = found[1]
+            again = walk.point(last.state, last.factor, last.iterations)  # its factor was replaced
+            walk.heeded(here, view, replace(again, rate=last.rate), critical=True)
+    return None, None if found is None else found[0]
 
 
 def _onward(

@@ -21,6 +21,7 @@ from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.equilibrium import TURN, Equilibrium
 from shellform.structure.solve.factorisation import Indefinite
 from shellform.structure.solve.loading import Drive, advance, kinked
+from shellform.structure.solve.outlook import Outlook, View
 from shellform.structure.solve.residual import STAGNANT, ResidualNorm, Turning, held, overturned
 
 _ITERATIONS = 12  # of Newton in one step
@@ -45,7 +46,7 @@ class PathPoint:
 @dataclass(frozen=True)
 class OnPath:
     """A point with what the next step needs: `tangent` (f,), the change of the free degrees of freedom with
-    the factor.
+    the factor; the lower `values` of K and its factor, the `matrix`, good until the next one is made.
     """
 
     state: State
@@ -55,6 +56,8 @@ class OnPath:
     rate: float
     iterations: int
     turned: float
+    values: Reals
+    matrix: Indefinite
 
     @property
     def negative(self) -> int:
@@ -94,6 +97,9 @@ class Walk:
         self.spent = 0
         self.largest = abs(goal) if lead is None else 0.0  # of the factors come to
         self.led = None if lead is None else self.number(lead)
+        span = float(np.ptp(start.positions, axis=0).max())
+        self.outlook = Outlook(assembly, span, self.measure.mass_shape)
+        self.first = 0.0  # change of the factor in the first step, below which none is a load to speak of
         self.direction = 1.0 if lead is not None or goal > 0.0 else -1.0
 
     def number(self, lead: Lead) -> int:
@@ -140,7 +146,9 @@ class Walk:
             raise InputError(
                 "nothing moves under this load", where="path", remedy="Choose a load that acts on free nodes."
             )
-        return OnPath(state, factor, found, tangent, 1.0 / speed, iterations, balance.turned)
+        assert balance.tangent is not None
+        rate, values = 1.0 / speed, balance.tangent
+        return OnPath(state, factor, found, tangent, rate, iterations, balance.turned, values, matrix)
 
     def step(self, here: OnPath, size: float) -> OnPath:
         """The point at `size` from `here`. Raises Missed."""
@@ -228,8 +236,32 @@ class Walk:
         factor = end if found.on_branch else here.factor + found.share * (end - here.factor)
         return self._settled(here, found.equilibrium.state, factor, _ITERATIONS)
 
-    def located(self, here: OnPath, size: float, there: OnPath) -> PathPoint | None:
-        """The point between two where the number of negative eigenvalues changes."""
+    def view(self, here: OnPath, before: View | None) -> View | None:
+        """What is to be seen from a point, by the length of the path; None from one that isn't stable."""
+        if not here.equilibrium.stable:
+            return None
+        onward = self.drive.imposed.ravel().copy()
+        onward[self.assembly.free] = here.tangent
+        onward *= here.rate
+        return self.outlook.view(here.state, here.values, here.matrix, onward.reshape(-1, 6), before)
+
+    def heeded(self, here: OnPath, seen: View, there: OnPath, *, critical: bool = False) -> View:
+        """What is to be seen from a stable point to which a step has led from one with the view `seen`.
+        Raises Missed where it may have passed over an unstable stretch (Outlook.passes_over)."""
+        then = self.view(there, seen)
+        assert then is not None
+        width = float(np.linalg.norm(self.between(here.state, there.state)))
+        if self.outlook.passes_over(seen, then, width, self.share(here, there), critical=critical):
+            raise Missed
+        return then
+
+    def share(self, here: OnPath, there: OnPath) -> float:
+        """By what share of the load it changes from one point to the other."""
+        return abs(there.factor - here.factor) / max(abs(here.factor), abs(there.factor), self.first)
+
+    def located(self, here: OnPath, size: float, there: OnPath) -> tuple[PathPoint, OnPath] | None:
+        """The point between two where the number of negative eigenvalues changes, and the last one found
+        before it; None where steps to it find none."""
         low, high, before, near = 0.0, 1.0, here, there
         total = size if self.led is not None else float(np.linalg.norm(self.between(here.state, there.state)))
         for _ in range(_BISECTIONS):
@@ -248,7 +280,7 @@ class Walk:
             ):
                 break
         kind = "limit point" if before.rate * near.rate < 0.0 else "bifurcation"
-        return replace(near.point(), event=kind)
+        return replace(near.point(), event=kind), before
 
     def gave_up(self, here: OnPath, what: str) -> NotConverged:
         """The refusal to go on from a point, saying `what` failed."""

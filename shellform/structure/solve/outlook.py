@@ -1,8 +1,9 @@
 """Whether a step along a branch may pass over an unstable stretch, told from both its ends.
 
-A step counts where every tangent that is made on it is positive definite (branch.py). Those are few, and a
-structure may lose its stability and have it again between two of them. With K the tangent, u the motion with
-the load factor by K at either end, and h the change of the factor, a step may have passed over something if
+A step counts where every tangent that is made on it is positive definite. Those are few, and a structure may
+lose its stability and have it again between two of them. With K the tangent at either end, u the motion there
+with what measures the step (the load factor, or the length of the path), and h the step, it may have passed
+over something if
 
 - it turns: the cubic of the factor over the way between both states, with its rates at both, turns round
   twice (loading.py), as where the step has led beyond a snap;
@@ -13,7 +14,8 @@ the load factor by K at either end, and h the change of the factor, a step may h
 
 The last is looked at through the softest modes V, V'MV = 1: V'KV + h V'K'V has to be positive definite. They
 come by inverse iteration from one state to the next, with the factor at hand; K' is a difference over a short
-way along u to the inside of the step. What comes at once, as a cable that goes slack, isn't foretold.
+way along u to the inside of the step. What comes at once, as a cable that goes slack, isn't foretold: it
+bends. So a step that changes the load by less than a 64th of it may bend, and by less than a 512th sink.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.structure.elements.state import State, moved
-from shellform.structure.solve.assembly import Assembly, Balance
+from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.factorisation import Factor
 from shellform.structure.solve.loading import turns_between
 
@@ -32,15 +34,17 @@ _MODES = 6  # the softest ones, through which the tangent is looked at
 _ROUNDS, _AGAIN = 8, 2  # of inverse iteration, at the beginning and from one state to the next
 _BENT = 0.2  # of the way of a step, by which the mean of the motions at its ends may miss it
 _SHORT, _TURNED = 1e-5, 1e-3  # of the span, and rad: the way over which differences are taken
+KINK = 1 / 64  # of the load, a step so short may turn or bend by a cable's kink
+WINDOW = 1 / 512  # of the load, a step so short may pass over bifurcations that lie within it
 
 
 @dataclass(frozen=True)
 class View:
-    """A stable `state` at a load `factor`: its tangent's lower `values` (nnz,); `onward` (n, 6), m and rad,
-    the motion with the factor; the `soft` shapes (f, k) with unit mass and their `stiffness` (k,), N/m."""
+    """A stable `state`: its tangent's lower `values`, as the assembly has them; `onward` (n, 6), m and rad,
+    the motion with what measures the step; the `soft` shapes (f, k) with unit mass and their `stiffness`
+    (k,), N/m."""
 
     state: State
-    factor: float
     values: Reals
     onward: Reals
     soft: Reals
@@ -48,57 +52,65 @@ class View:
 
 
 class Outlook:
-    """What is to be seen from the states of one structure's path under the dead `load` (n, 6); `mass` (f,)
-    is what modes are measured by."""
+    """What is to be seen from the states of one structure's path; `mass` (f,) is what modes are measured by,
+    `span`, m, the structure's size."""
 
-    def __init__(self, assembly: Assembly, load: Reals, span: float, mass: Reals) -> None:
-        self.assembly, self.load, self.span, self.mass = assembly, load, span, mass[:, None]
+    def __init__(self, assembly: Assembly, span: float, mass: Reals) -> None:
+        self.assembly, self.span, self.mass = assembly, span, mass[:, None]
 
-    def view(self, state: State, balance: Balance, factor: Factor, share: float, before: View | None) -> View:
-        """From a state with its balance and its tangent's factor at a load factor, `share`, after the one
-        `before`."""
-        own = self.assembly
-        assert balance.tangent is not None
-        onward = own.by_node(factor.solve(self.load.ravel()[own.free]))
-        shapes, rounds = (_first(len(own.free)), _ROUNDS) if before is None else (before.soft, _AGAIN)
+    def view(self, state: State, values: Reals, factor: Factor, onward: Reals, before: View | None) -> View:
+        """From a state with its tangent's lower values, their factor and the motion `onward` (n, 6), after
+        the view `before`."""
+        size = len(self.assembly.free)
+        shapes, rounds = (_first(size), _ROUNDS) if before is None else (before.soft, _AGAIN)
         stiffness = np.zeros(0)
         for _ in range(rounds):
             inert = self.mass * shapes
             solved = np.asarray(factor.solve(inert))
             stiffness, mixed = _ritz(solved.T @ inert, solved.T @ (self.mass * solved))
             shapes = solved @ mixed
-        return View(state, share, balance.tangent, onward, shapes, stiffness)
+        return View(state, values, onward, shapes, stiffness)
 
-    def turns(self, before: View, after: View) -> bool:
-        """Whether the step may have led to another branch."""
+    def turns(self, before: View, after: View, width: float) -> bool:
+        """Whether a step that changes the load factor by `width`, and views' motions are by it, may have led
+        to another branch."""
         way = after.state.positions - before.state.positions
         length = float(np.linalg.norm(way))
         rates = [float(np.einsum("ij,ij", way, each.onward[:, :3])) for each in (before, after)]
         if length == 0.0 or 0.0 in rates:
             return False
-        mean = (after.factor - before.factor) / length
-        return turns_between(length / rates[0], length / rates[1], mean)
+        return turns_between(length / rates[0], length / rates[1], width / length)
 
-    def bends(self, before: View, after: View) -> bool:
+    def passes_over(
+        self, before: View, after: View, width: float, share: float, *, critical: bool = False
+    ) -> bool:
+        """Whether a step of a `width` that changes the load by a `share` of it may pass over something;
+        where the step ends beside a `critical` point it may sink within a window of that."""
+        if share > KINK and self.bends(before, after, width):
+            return True
+        if share <= WINDOW:
+            return False
+        return self.sinks(before, after, (1.0 - WINDOW / share) * width if critical else width)
+
+    def bends(self, before: View, after: View, width: float) -> bool:
         """Whether the nodes go otherwise than by the mean of their motions at both ends of the step."""
         way = after.state.positions - before.state.positions
-        mean = 0.5 * (after.factor - before.factor) * (before.onward + after.onward)[:, :3]
+        mean = 0.5 * width * (before.onward + after.onward)[:, :3]
         return bool(np.linalg.norm(way - mean) > _BENT * np.linalg.norm(way))
 
-    def sinks(self, before: View, after: View) -> bool:
+    def sinks(self, before: View, after: View, width: float) -> bool:
         """Whether the tangent, going on as it changes at one end of the step, loses definiteness before the
         other."""
-        width = after.factor - before.factor
-        return any(self._lost(view, side * width) for view, side in ((before, 1.0), (after, -1.0)))
+        return any(self._lost(view, change) for view, change in ((before, width), (after, -width)))
 
     def _lost(self, view: View, change: float) -> bool:
-        """Whether the tangent does by a `change` of the load factor."""
+        """Whether the tangent does by a `change` of what measures the step."""
         rate = self.assembly.matrix.full(self._rate(view, float(np.sign(change))))
         rises = change * (view.soft.T @ (rate @ view.soft))
         return bool(np.linalg.eigvalsh(np.diag(view.stiffness) + rises)[0] <= 0.0)
 
     def _rate(self, view: View, side: float) -> Reals:
-        """How the tangent's lower values (nnz,) change with the load factor, to the `side` 1 or -1."""
+        """How the tangent's lower values change with what measures the step, to the `side` 1 or -1."""
         far = float(np.abs(view.onward[:, :3]).max()) / (_SHORT * self.span)
         change = side / max(far, float(np.abs(view.onward[:, 3:]).max()) / _TURNED, 1.0)
         motion = self.assembly.chords.corrected(view.state, change * view.onward)
