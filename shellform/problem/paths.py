@@ -12,8 +12,10 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
+from shellform.structure.solve.drive import forces
 from shellform.structure.solve.equilibrium import find_equilibrium
-from shellform.structure.solve.loading import Loaded, apply_load
+from shellform.structure.solve.loading import Loaded
+from shellform.structure.solve.settled import settle
 
 _SLACK_MARGIN = 1e-6  # relative tension below which a cable counts as slack
 
@@ -22,8 +24,11 @@ def follow(
     shell: Gridshell, design: Design, loads: Mapping[str, Reals], *, stay: bool = False
 ) -> dict[str, Loaded]:
     """The documented path of a design: unloaded from the target shape by relaxation, then each load case on
-    its own from there, step by step (loading.py), heeding what a step may leap over. `shellform analyse` goes
-    the same way.
+    its own from there, step by step, heeding what a step may pass over, and along the path where no step gets
+    on (settled.py). `shellform analyse` goes the same way. `on_branch` of what is found is true where no
+    unstable state is met, or foretold by both ends of a step, on the way: of a stretch shorter than a 512th
+    of the load, and of what comes at once as a cable that goes slack, nothing may be seen. It is false, too,
+    where neither steps nor the path come to the load.
 
     The cases, forces (n, 6), N and Nm, are solved side by side on the cores. With `stay` snap-through isn't
     followed. Raises InputError for forces of another shape, NotConverged where no equilibrium is found.
@@ -41,7 +46,7 @@ def follow(
             own = idle.pop()
         except IndexError:
             own = first.beside()
-        found = apply_load(own, unloaded.state, none, load, stay=stay, heeding=True)
+        found = settle(own, unloaded.state, forces(load), stay=stay)
         idle.append(own)
         return found
 

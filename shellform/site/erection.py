@@ -32,8 +32,9 @@ from shellform.structure.elements.beam import joined
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import Equilibrium, find_equilibrium
-from shellform.structure.solve.loading import Drive, advance
+from shellform.structure.solve.loading import advance
 from shellform.tables import Table, table_text
 
 STEP = 0.1  # of a stage

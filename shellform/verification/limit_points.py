@@ -13,7 +13,7 @@ from shellform.structure.answers.stability import critical_load
 from shellform.structure.elements.beam import make_beams
 from shellform.structure.elements.state import at_rest
 from shellform.structure.network import Network, assemble
-from shellform.structure.solve.loading import forces
+from shellform.structure.solve.drive import forces
 from shellform.verification import exact
 from shellform.verification.beams import lee_frame
 from shellform.verification.compared import Comparison, rows

@@ -16,8 +16,8 @@ from shellform.structure.elements.beam import make_beams
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.state import State, at_rest
 from shellform.structure.network import Network, assemble
+from shellform.structure.solve.drive import forces
 from shellform.structure.solve.equilibrium import find_equilibrium
-from shellform.structure.solve.loading import forces
 from shellform.structure.solve.path import follow
 
 Stiffness = tuple[float, float, float, float]

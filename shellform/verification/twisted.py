@@ -11,7 +11,7 @@ from shellform.arrays import Reals
 from shellform.structure.answers.stability import critical_load
 from shellform.structure.elements.state import at_rest
 from shellform.structure.network import assemble
-from shellform.structure.solve.loading import forces
+from shellform.structure.solve.drive import forces
 from shellform.structure.solve.path import follow
 from shellform.verification import exact
 from shellform.verification.compared import Comparison, rows

@@ -5,8 +5,8 @@ import numpy as np
 import shellform as sf
 from shellform.structure.network import assemble
 from shellform.structure.solve import path
+from shellform.structure.solve.drive import forces
 from shellform.structure.solve.equilibrium import find_equilibrium
-from shellform.structure.solve.loading import forces
 
 
 def dish(rise, spacing, radius, angle, rest_ratio):

@@ -8,6 +8,7 @@ import pytest
 import shellform as sf
 from shellform.problem import paths
 from shellform.structure.elements.state import at_rest
+from tests.gridshell.dishes import dish
 
 NONE = np.zeros((2, 6))
 DOWN = np.zeros((2, 6))
@@ -26,14 +27,13 @@ def test_each_load_is_followed_from_the_unloaded_state_and_nothing_is_that_state
         assert (target, load.any()) == ("target", False)
         return SimpleNamespace(state="unloaded", factorisations=9)
 
-    def apply_load(assembly, state, before, after, *, stay, heeding):
-        assert heeding, "of what a step may leap over"
-        followed.append((state, before.any(), after.sum(), stay))
-        return f"under {after.sum()}"
+    def settle(assembly, state, drive, *, stay):
+        followed.append((state, drive.at(0.0).any(), drive.at(1.0).sum(), stay))
+        return f"under {drive.at(1.0).sum()}"
 
     monkeypatch.setattr(paths, "assemble", lambda network: Assembly())
     monkeypatch.setattr(paths, "find_equilibrium", find)
-    monkeypatch.setattr(paths, "apply_load", apply_load)
+    monkeypatch.setattr(paths, "settle", settle)
     shell = SimpleNamespace(node_count=2, network=lambda design: design, target="target")
     found = paths.follow(shell, "design", {"none": NONE, "wet": DOWN, "wetter": 1.5 * DOWN}, stay=stay)
     assert list(found) == ["none", "wet", "wetter"]
@@ -87,3 +87,28 @@ def test_a_load_beyond_the_end_of_its_branch_is_not_on_it_though_a_quarter_of_it
     assert found["below"].on_branch
     assert not found["beyond"].on_branch
     assert found["beyond"].share * 1.21 == pytest.approx(0.93, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("made", "borne", "shares"),
+    [
+        ((0.04, 0.55, 0.002, 0.25 * np.pi, 0.995), 7.319, (1.1, 1.3, 2.0)),
+        ((0.05, 0.4, 0.0015, 0.25 * np.pi, 0.995), 7.495, (1.1, 1.3, 2.0)),
+        ((0.16, 0.4, 0.003, 0.25 * np.pi, 0.999), 10.133, (1.3,)),
+    ],
+)
+def test_a_load_beyond_an_unstable_stretch_is_not_on_its_branch_though_the_shell_is_stable_again(
+    made, borne, shares
+):
+    """Dishes that lose their stability under so many N a crossing, and have it again a little later: each was
+    told on its branch under these shares of it."""
+    shell, design = dish(*made)
+    loads = {f"{share}": shell.point_load(share * borne) for share in (0.98, *shares)}
+    told = {name: found.on_branch for name, found in paths.follow(shell, design, loads, stay=True).items()}
+    assert told == {name: name == "0.98" for name in loads}
+
+
+def test_a_load_short_of_the_end_of_its_branch_is_on_it_though_increments_get_no_further():
+    """A dish that bears 3.781 N a crossing was told off its branch under 0.95 of that."""
+    shell, design = dish(0.06, 0.55, 0.003, 0.25 * np.pi, 0.999)
+    assert paths.follow(shell, design, {"wet": shell.point_load(0.95 * 3.781)})["wet"].on_branch

@@ -11,8 +11,9 @@ from shellform.gridshell.reactions import reactions
 from shellform.net.grid import ROD
 from shellform.site.erection import erect, laid_out
 from shellform.structure.network import assemble
+from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import find_equilibrium
-from shellform.structure.solve.loading import Drive, advance
+from shellform.structure.solve.loading import advance
 
 
 @pytest.fixture(scope="module")

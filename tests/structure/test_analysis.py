@@ -14,8 +14,8 @@ from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import at_rest, from_vectors
 from shellform.structure.model import Model
 from shellform.structure.network import assemble
+from shellform.structure.solve.drive import forces
 from shellform.structure.solve.dynamic import dynamic
-from shellform.structure.solve.loading import forces
 from shellform.verification import exact, limit_points
 from shellform.verification.models import CLAMP, PIN, chain, in_plane, line, load_at, order, polyline, ropes
 

@@ -12,8 +12,8 @@ from shellform.structure.answers.halved import Refined, critical_error
 from shellform.structure.elements.state import at_rest
 from shellform.structure.model import Model
 from shellform.structure.network import assemble
+from shellform.structure.solve.drive import Drive, forces
 from shellform.structure.solve.equilibrium import Equilibrium
-from shellform.structure.solve.loading import Drive, forces
 from shellform.structure.solve.residual import Drowned
 from shellform.verification.models import CLAMP, chain, line, load_at
 
@@ -62,8 +62,7 @@ def test_increments_of_newton_s_and_of_dynamic_relaxation_are_equal_and_supports
 def test_a_relaxation_that_leaves_the_branch_says_at_which_factor(monkeypatch):
     asked, shares = [], [1.0, 0.25, 0.5]
 
-    def advance(_assembly, _state, _drive, *, begin, end, tolerance, heeding, limit, report):
-        assert heeding
+    def settle(_assembly, _state, _drive, *, begin, end, tolerance, limit, report):
         asked.append((begin, end, tolerance, limit))
         report(0.5, equilibrium(0.0, spent=3))
         share = shares.pop(0)
@@ -71,7 +70,7 @@ def test_a_relaxation_that_leaves_the_branch_says_at_which_factor(monkeypatch):
             on_branch=share == 1.0, share=share, equilibrium=equilibrium(0.0), factorisations=8
         )
 
-    monkeypatch.setattr(analysis, "advance", advance)
+    monkeypatch.setattr(analysis, "settle", settle)
     told = []
     walk = walking(limit=321, factor=6.0, told=lambda *each: told.append(each))
     walk.increments(3, "relaxation")
@@ -90,7 +89,7 @@ MOMENT = (0.0, 0.0, 0.0, 2.0, 0.0, 5.0)
 def test_under_moments_that_turn_nodes_the_relaxation_is_given_up_sooner_and_the_path_followed(monkeypatch):
     limits, drives = [], []
 
-    def advance(_assembly, _state, _drive, *, limit, **_):
+    def settle(_assembly, _state, _drive, *, limit, **_):
         limits.append(limit)
         raise NotConverged("stalled", iterations=50)
 
@@ -99,11 +98,12 @@ def test_under_moments_that_turn_nodes_the_relaxation_is_given_up_sooner_and_the
             factor=factor, equilibrium=equilibrium(x, spent=spent, stable=stable), event=event
         )
 
-    def follow(_assembly, _state, drive, *, tolerance):
+    def follow(_assembly, _state, drive, *, tolerance, heeding):
+        assert heeding
         drives.append((drive.at(0.0)[2, 5], drive.at(1.0)[2, 5], drive.imposed[0, 0], tolerance))
         return iter([point(0.0, 0, 1), point(0.5, 0.1, 4), point(1.0, 0.2, 9, stable=len(drives) == 1)])
 
-    monkeypatch.setattr(analysis, "advance", advance)
+    monkeypatch.setattr(analysis, "settle", settle)
     monkeypatch.setattr(analysis, "follow", follow)
     told = []
     walk = walking(MOMENT, imposed=0.25, factor=4.0, told=lambda *each: told.append(each))
@@ -126,10 +126,10 @@ def test_under_moments_that_turn_nodes_the_relaxation_is_given_up_sooner_and_the
 def test_where_no_moment_turns_nodes_or_rounding_hides_the_load_no_path_is_followed(monkeypatch):
     for error, load in ((NotConverged("stalled"), (0, 0, -4.0, 0, 0, 0)), (Drowned("drowned"), MOMENT)):
 
-        def advance(*_, raised=error, **__):
+        def settle(*_, raised=error, **__):
             raise raised
 
-        monkeypatch.setattr(analysis, "advance", advance)
+        monkeypatch.setattr(analysis, "settle", settle)
         with pytest.raises(NotConverged, match=error.what):
             walking(load).increments(1, "relaxation")
 
@@ -155,7 +155,7 @@ def test_a_path_tells_its_points_what_each_took_and_where_the_branch_was_left_fi
     monkeypatch.setattr(analysis, "follow", follow)
     walk = walking()
     walk.path((2, 2, -0.5), parts)
-    assert given == {"goal": 3.0, "lead": (2, 2, -0.5), "first": first, "tolerance": 1e-7}
+    assert given == {"goal": 3.0, "lead": (2, 2, -0.5), "first": first, "tolerance": 1e-7, "heeding": True}
     assert [(each.reached.factor, each.reached.factorisations, each.event) for each in walk.behind] == [
         (0.7, 4, ""),
         (1.2, 5, "limit point"),

@@ -18,6 +18,7 @@ from shellform.structure.elements.state import extended as with_tail
 from shellform.structure.model import Model
 from shellform.structure.network import assemble
 from shellform.structure.solve import equilibrium
+from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.extended import (
     ExtendedSymmetric,
@@ -26,7 +27,6 @@ from shellform.structure.solve.extended import (
     with_twice_the_digits,
 )
 from shellform.structure.solve.factorisation import NotPositiveDefinite
-from shellform.structure.solve.loading import Drive
 from shellform.structure.solve.refined import RefinedFactor
 from shellform.structure.solve.residual import ResidualNorm
 from shellform.verification.cables import hypar

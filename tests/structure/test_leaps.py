@@ -8,9 +8,10 @@ import pytest
 from shellform.errors import NotConverged
 from shellform.structure.elements.state import at_rest
 from shellform.structure.network import assemble
-from shellform.structure.solve import loading
+from shellform.structure.solve import leaps, loading
+from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import Equilibrium
-from shellform.structure.solve.loading import Drive, advance
+from shellform.structure.solve.loading import advance
 from shellform.verification.models import CLAMP, chain, line, load_at
 
 STILL = SimpleNamespace(at=lambda factor: factor, moves_supports=False)
@@ -35,9 +36,10 @@ def heeded(monkeypatch):
         return asked.returns
 
     monkeypatch.setattr(loading, "find_equilibrium", find)
-    monkeypatch.setattr(loading, "_far", lambda before, after: asked.far)
-    monkeypatch.setattr(loading, "_may_leap", may_leap)
-    monkeypatch.setattr(loading, "_returns", returns)
+    monkeypatch.setattr(leaps, "_far", lambda before, after: asked.far)
+    monkeypatch.setattr(leaps, "_may_leap", may_leap)
+    monkeypatch.setattr(leaps, "_returns", returns)
+    monkeypatch.setattr(leaps.Watch, "passes_over", lambda *_: False)
     return asked
 
 
@@ -76,7 +78,7 @@ def test_a_node_goes_far_that_goes_a_fiftieth_of_the_extent():
     before = at_rest(np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 10.0, 0.0]]))
     for way, far in ((0.19, False), (0.21, True)):
         after = at_rest(before.positions + np.outer([0.0, 1.0, 0.0], [0.0, 0.6 * way, 0.8 * way]))
-        assert loading._far(before, after) is far
+        assert leaps._far(before, after) is far
 
 
 def along(x):
@@ -95,16 +97,16 @@ def rests(monkeypatch):
 
     def motion(assembly, state, drive):
         slope = found.slope(state.positions[1, 0])
-        return None if slope < 0.0 else np.array([[0.0, 0.0, 0.0], [1.0 / slope, 0.0, 0.0]])
+        return None if slope < 0.0 else (None, None, np.array([[0.0, 0.0, 0.0], [1.0 / slope, 0.0, 0.0]]))
 
-    monkeypatch.setattr(loading, "_at_rest", at_rest_under)
-    monkeypatch.setattr(loading, "_motion", motion)
+    monkeypatch.setattr(leaps, "at_rest", at_rest_under)
+    monkeypatch.setattr(leaps, "_motion", motion)
     return found
 
 
 def may_leap(rests, low, high):
     before, after = rests.load(low), rests.load(high)
-    return loading._may_leap(None, along(low), along(high), STILL, after, after - before)
+    return leaps._may_leap(None, along(low), along(high), STILL, after, after - before)
 
 
 def test_an_increment_over_a_peak_and_a_valley_may_leap_and_one_before_or_beyond_them_does_not(rests):
@@ -124,9 +126,9 @@ def test_a_state_that_is_not_at_rest_before_tells_nothing_nor_does_one_of_other_
     rests.load = lambda x: x * (1.0 - x) * (1.0 - 0.5 * x)
     rests.slope = lambda x: 1.0 - 3.0 * x + 1.5 * x * x
     low, high, last = along(0.0), along(2.1), rests.load(2.1)
-    assert loading._may_leap(None, low, high, STILL, last, last)
-    assert not loading._may_leap(None, low, high, STILL, last, 0.9 * last)
-    assert not loading._may_leap(None, low, SimpleNamespace(tail=1.0), STILL, last, last)
+    assert leaps._may_leap(None, low, high, STILL, last, last)
+    assert not leaps._may_leap(None, low, high, STILL, last, 0.9 * last)
+    assert not leaps._may_leap(None, low, SimpleNamespace(tail=1.0), STILL, last, last)
 
 
 @pytest.mark.parametrize(("off", "comes_back"), [(0.0, True), (0.039, True), (0.041, False), (0.4, False)])
@@ -142,22 +144,22 @@ def test_a_state_comes_back_to_within_a_tenth_of_its_way(monkeypatch, off, comes
         asked.append((start, load, limit))
         return SimpleNamespace(state=along(1.0 - off))
 
-    monkeypatch.setattr(loading, "_carried", carried)
-    monkeypatch.setattr(loading, "find_equilibrium", find)
-    assert loading._returns(None, along(1.0), along(1.4), STILL, 3.0, 0.5, 44) is comes_back
+    monkeypatch.setattr(leaps, "carried", carried)
+    monkeypatch.setattr(leaps, "find_equilibrium", find)
+    assert leaps._returns(None, along(1.0), along(1.4), STILL, 3.0, 0.5, 44) is comes_back
     assert asked == [(1.4, -0.5), ("carried", 2.5, 44)]
 
 
-@pytest.mark.parametrize("lost", ["_carried", "find_equilibrium"])
+@pytest.mark.parametrize("lost", ["carried", "find_equilibrium"])
 def test_a_state_that_nothing_is_found_behind_does_not_come_back(monkeypatch, lost):
     def fails(*_, **__):
         raise NotConverged("lost")
 
-    monkeypatch.setattr(loading, "_carried", lambda *_: ("carried", 1))
-    monkeypatch.setattr(loading, "find_equilibrium", lambda *_, **__: SimpleNamespace(state=along(1.0)))
-    assert loading._returns(None, along(1.0), along(1.4), STILL, 3.0, 0.5, 44)
-    monkeypatch.setattr(loading, lost, fails)
-    assert not loading._returns(None, along(1.0), along(1.4), STILL, 3.0, 0.5, 44)
+    monkeypatch.setattr(leaps, "carried", lambda *_: ("carried", 1))
+    monkeypatch.setattr(leaps, "find_equilibrium", lambda *_, **__: SimpleNamespace(state=along(1.0)))
+    assert leaps._returns(None, along(1.0), along(1.4), STILL, 3.0, 0.5, 44)
+    monkeypatch.setattr(leaps, lost, fails)
+    assert not leaps._returns(None, along(1.0), along(1.4), STILL, 3.0, 0.5, 44)
 
 
 def test_nodes_move_with_their_supports_and_by_the_load():
@@ -174,7 +176,8 @@ def test_nodes_move_with_their_supports_and_by_the_load():
         (Drive(pull, imposed, none), 0.2, 0.25),
         (Drive(-2.0 * pull, imposed, none), 0.2, 0.1),
     ):
-        motion = loading._motion(assembly, start, drive)
+        _, _, motion = leaps._motion(assembly, start, drive)
+        motion = motion[:, :3]
         np.testing.assert_allclose(motion, [[clamp, 0.0, 0.0], [tip, 0.0, 0.0]], atol=1e-12)
 
 
@@ -183,7 +186,7 @@ def test_where_the_tangent_is_not_positive_definite_nothing_is_told_of_a_motion(
     network = chain(line(1), (100.0, 1.0, 1.0, 1.0), {0: CLAMP})
     pull, none = load_at(network, 1, [5.0, 0.0, 0.0]), np.zeros((2, 6))
     half = at_rest(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]))
-    assert loading._motion(assemble(network), half, Drive(pull, none, none)) is None
+    assert leaps._motion(assemble(network), half, Drive(pull, none, none)) is None
 
 
 def test_a_state_is_at_rest_with_next_to_nothing_of_its_load_left_over():
@@ -191,7 +194,7 @@ def test_a_state_is_at_rest_with_next_to_nothing_of_its_load_left_over():
     assembly, pull = assemble(network), load_at(network, 1, [5.0, 0.0, 0.0])
     for stretched, rests in ((0.05, True), (0.05 * (1.0 + 1e-6), True), (0.0501, False), (0.0, False)):
         state = at_rest(np.array([[0.0, 0.0, 0.0], [1.0 + stretched, 0.0, 0.0]]))
-        assert loading._at_rest(assembly, state, pull) is rests
+        assert leaps.at_rest(assembly, state, pull) is rests
 
 
 @pytest.mark.parametrize(
@@ -206,4 +209,67 @@ def test_a_state_is_at_rest_with_next_to_nothing_of_its_load_left_over():
 )
 def test_a_cable_that_goes_slack_or_taut_makes_a_kink(before, after, kinked):
     cables = SimpleNamespace(lengths=np.array, rest_length=np.ones(2))
-    assert loading.kinked(SimpleNamespace(cables=(cables,)), before, after) is kinked
+    assert leaps.kinked(SimpleNamespace(cables=(cables,)), before, after) is kinked
+
+
+FREE = SimpleNamespace(free=[0])
+
+
+class Foreseen:
+    """Increments that all come to rest, seen from places as they are told; what passes over the `window` does
+    so."""
+
+    def __init__(self, monkeypatch, window, *, resting=lambda load: True):
+        self.window, self.looks, self.tried = window, [], []
+
+        def find(assembly, start, load, *, tolerance, limit=None, on_branch=False):
+            self.tried.append(load)
+            return Equilibrium(
+                SimpleNamespace(positions=np.zeros((2, 3)), tail=None, at=load), 0, 0, 2, True, 0
+            )
+
+        def motion(assembly, state, drive):
+            return "values", "factor", "motion"
+
+        monkeypatch.setattr(loading, "find_equilibrium", find)
+        monkeypatch.setattr(leaps, "at_rest", lambda assembly, state, load: resting(load))
+        monkeypatch.setattr(leaps, "_motion", motion)
+        monkeypatch.setattr(leaps, "fit_for", lambda assembly, state: assembly)
+        monkeypatch.setattr(leaps, "_outlook", lambda assembly, state: self)
+        self.start = SimpleNamespace(positions=np.zeros((2, 3)), tail=None, at=0.0)
+
+    def view(self, state, values, factor, onward, before):
+        assert (values, factor, onward) == ("values", "factor", "motion")
+        return SimpleNamespace(at=state.at, before=None if before is None else before.at)
+
+    def passes_over(self, before, after, width, share):
+        assert after.at - before.at == pytest.approx(width)
+        self.looks.append((before.at, after.at, share, after.before))
+        return before.at <= self.window and after.at >= self.window
+
+
+def test_an_increment_that_may_pass_over_something_is_halved_to_a_512th_of_the_load(monkeypatch):
+    seen = Foreseen(monkeypatch, 0.9)
+    found = advance(FREE, seen.start, STILL, end=2.0, step=0.25, heeding=True)
+    assert found.on_branch
+    assert seen.looks[:3] == [(0.0, 0.5, 0.25, 0.0), (0.5, 1.0, 0.25, 0.5), (0.5, 0.75, 0.125, 0.5)]
+    shares = [share for *_, share, _ in seen.looks]
+    assert min(shares) == 1 / 256
+    assert min(np.diff(seen.tried)[np.diff(seen.tried) > 0.0]) == 2.0 / 512
+    begins = len({round(begin, 9) for begin, *_ in seen.looks})
+    assert found.factorisations == 2 * len(seen.tried) + len(seen.looks) + 2, "the start, and one unseen"
+    assert begins > 4
+
+
+def test_a_start_that_is_not_at_rest_foretells_nothing(monkeypatch):
+    seen = Foreseen(monkeypatch, 0.1, resting=lambda load: load > 0.0)
+    assert advance(FREE, seen.start, STILL, step=0.25, heeding=True).on_branch
+    assert [look[0] for look in seen.looks] == [0.25, 0.5, 0.75]
+    assert [look[3] for look in seen.looks] == [0.25, 0.5, 0.75]
+
+
+def test_states_of_other_digits_foretell_nothing_of_each_other(monkeypatch):
+    seen = Foreseen(monkeypatch, 0.1)
+    seen.start.tail = "tail"
+    assert advance(FREE, seen.start, STILL, step=0.25, heeding=True).on_branch
+    assert [look[0] for look in seen.looks] == [0.25, 0.5, 0.75]

@@ -8,10 +8,13 @@ import pytest
 
 from shellform.errors import NotConverged
 from shellform.structure.elements.state import State, at_rest
+from shellform.structure.solve import drive as drives
 from shellform.structure.solve import loading
+from shellform.structure.solve.drive import Drive, forces
 from shellform.structure.solve.equilibrium import Equilibrium
 from shellform.structure.solve.factorisation import NotPositiveDefinite
-from shellform.structure.solve.loading import Drive, advance, apply_load, forces
+from shellform.structure.solve.loading import advance, apply_load
+from shellform.structure.solve.outlook import turns_between
 
 
 @pytest.fixture
@@ -76,7 +79,7 @@ def test_supports_are_carried_on_by_each_increment_s_change_of_the_factor(tried,
         changes.append(change)
         return state, 3
 
-    monkeypatch.setattr(loading, "_carried", carried)
+    monkeypatch.setattr(loading, "carried", carried)
     found = advance(None, "start", STILL, begin=1.0, end=4.0, step=0.5)
     assert changes == [1.5, 1.5]
     assert found.factorisations == 2 * (3 + 7)
@@ -143,26 +146,26 @@ def moving():
 
 def test_beyond_the_branch_supports_move_by_halves_of_what_is_left_until_nothing_folds(monkeypatch):
     drive, start = moving()
-    monkeypatch.setattr(loading, "_folded", lambda _, before, after: after.positions[1, 0] > 1.2)
-    there, share = loading._moved_on(None, start, drive, 0.2, 1.0, 3.0)
+    monkeypatch.setattr(drives, "_folded", lambda _, before, after: after.positions[1, 0] > 1.2)
+    there, share = drives.moved_on(None, start, drive, 0.2, 1.0, 3.0)
     assert share == pytest.approx(0.4)  # of 0.8 · 2 · 0.4 m all, half and a quarter
     assert there.positions[1, 0] == pytest.approx(1.16)
-    monkeypatch.setattr(loading, "_folded", lambda *_: False)
-    there, share = loading._moved_on(None, start, drive, 0.2, 1.0, 3.0)
+    monkeypatch.setattr(drives, "_folded", lambda *_: False)
+    there, share = drives.moved_on(None, start, drive, 0.2, 1.0, 3.0)
     assert (share, there.positions[1, 0]) == (1.0, pytest.approx(1.64))
     asked = []
-    monkeypatch.setattr(loading, "_folded", lambda *_: asked.append(1) or True)
+    monkeypatch.setattr(drives, "_folded", lambda *_: asked.append(1) or True)
     with pytest.raises(NotConverged, match=r"fold an element.*more increments"):
-        loading._moved_on(None, start, drive, 0.2, 1.0, 3.0)
+        drives.moved_on(None, start, drive, 0.2, 1.0, 3.0)
     assert len(asked) == 20, "0.8 / 2^20 is below a millionth"
     still = forces(np.zeros((2, 6)))
-    assert loading._moved_on(None, start, still, 0.2, 1.0, 3.0) == (start, 1.0)
+    assert drives.moved_on(None, start, still, 0.2, 1.0, 3.0) == (start, 1.0)
 
 
 def test_the_rest_is_applied_in_as_many_stops_as_moving_supports_need(tried, monkeypatch):
     tried.refuse = lambda factor: True
     shares = iter([0.5, 0.75, 1.0])
-    monkeypatch.setattr(loading, "_moved_on", lambda _, state, *__: (state, next(shares)))
+    monkeypatch.setattr(loading, "moved_on", lambda _, state, *__: (state, next(shares)))
     found = advance(None, "start", STILL, begin=1.0, end=5.0, limit=99)
     assert [each.factor for each in tried if not each.on_branch] == [3.0, 4.0, 5.0]
     assert (found.share, found.equilibrium.state) == (0.0, "at 5")
@@ -179,8 +182,8 @@ def test_an_element_folds_where_it_is_halved_or_turned_over(monkeypatch, halved,
         chords=SimpleNamespace(halved=lambda *states: halved and states == ("before", "after")),
     )
     asked = []
-    monkeypatch.setattr(loading, "overturned", lambda *each: asked.append(each[1:]) or over)
-    assert loading._folded(assembly, "before", "after") == folded
+    monkeypatch.setattr(drives, "overturned", lambda *each: asked.append(each[1:]) or over)
+    assert drives._folded(assembly, "before", "after") == folded
     assert asked in ([], [("before", 0.3, "after", 0.7)])
 
 
@@ -211,19 +214,19 @@ class Springs:
 
 def test_supports_take_the_free_nodes_along_by_the_tangent_where_that_folds_nothing(monkeypatch):
     drive, start = moving()
-    monkeypatch.setattr(loading, "fit_for", lambda assembly, _: assembly)
-    monkeypatch.setattr(loading, "held", lambda *_: "held")
-    monkeypatch.setattr(loading, "_folded", lambda *_: False)
-    there, cost = loading._carried(Springs(), start, drive, 0.5)
+    monkeypatch.setattr(drives, "fit_for", lambda assembly, _: assembly)
+    monkeypatch.setattr(drives, "held", lambda *_: "held")
+    monkeypatch.setattr(drives, "_folded", lambda *_: False)
+    there, cost = drives.carried(Springs(), start, drive, 0.5)
     assert isinstance(there, State)
     assert there.positions[:, 0].tolist() == [pytest.approx(0.05), pytest.approx(1.2)]
     assert cost == 1
-    there, cost = loading._carried(Springs(definite=False), start, drive, 0.5)
+    there, cost = drives.carried(Springs(definite=False), start, drive, 0.5)
     assert there.positions[:, 0].tolist() == [0.0, pytest.approx(1.2)]
-    assert loading._carried(None, start, forces(np.zeros((2, 6))), 0.5) == (start, 0)
-    monkeypatch.setattr(loading, "_folded", lambda *_: True)
+    assert drives.carried(None, start, forces(np.zeros((2, 6))), 0.5) == (start, 0)
+    monkeypatch.setattr(drives, "_folded", lambda *_: True)
     with pytest.raises(NotConverged, match="Move them by less") as told:
-        loading._carried(Springs(), start, drive, 0.5)
+        drives.carried(Springs(), start, drive, 0.5)
     assert (told.value.state, told.value.iterations) == (start, 1)
 
 
@@ -245,7 +248,7 @@ def test_supports_take_the_free_nodes_along_by_the_tangent_where_that_folds_noth
     ],
 )
 def test_a_cubic_turns_round_between_its_ends_where_its_slope_has_both_signs(before, after, mean, turns):
-    assert loading.turns_between(before, after, mean) is turns
+    assert turns_between(before, after, mean) is turns
     along = np.linspace(0.0, 1.0, 2001)
     slope = before + along * (6.0 * mean - 4.0 * before - 2.0 * after)
     slope = slope + 3.0 * along**2 * (before + after - 2.0 * mean)

@@ -10,9 +10,9 @@ from shellform.structure.answers.stability import critical_load
 from shellform.structure.elements.state import at_rest
 from shellform.structure.network import assemble
 from shellform.structure.solve import path
+from shellform.structure.solve.drive import forces
 from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.factorisation import Symmetric
-from shellform.structure.solve.loading import forces
 from shellform.structure.solve.outlook import KINK, WINDOW, Outlook, View
 from tests.gridshell.dishes import dish, first_critical
 

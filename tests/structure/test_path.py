@@ -11,8 +11,9 @@ from shellform.structure.elements.rotation import identity
 from shellform.structure.elements.state import State, at_rest
 from shellform.structure.network import Network, assemble
 from shellform.structure.solve import path
+from shellform.structure.solve.drive import Drive, forces
 from shellform.structure.solve.equilibrium import find_equilibrium, newton
-from shellform.structure.solve.loading import Drive, advance, forces
+from shellform.structure.solve.loading import advance
 from shellform.structure.solve.path import follow
 from shellform.verification import exact
 from shellform.verification.models import CLAMP, chain, line, load_at, polyline

@@ -9,8 +9,8 @@ import pytest
 from shellform.errors import InputError, NotConverged
 from shellform.structure.elements.state import at_rest
 from shellform.structure.solve import path
+from shellform.structure.solve.drive import forces
 from shellform.structure.solve.equilibrium import Equilibrium
-from shellform.structure.solve.loading import forces
 from shellform.structure.solve.path import follow
 from shellform.structure.solve.walk import Missed, OnPath, Walk
 
@@ -41,9 +41,7 @@ class Curve:
         rate = (self.load(x + 1e-6) - self.load(x - 1e-6)) / 2e-6
         negative = self.negatives(x)
         found = Equilibrium(x, 0.0, 1e-9, 1, negative == 0, negative)
-        return OnPath(
-            x, self.load(x), found, np.array([1.0 / rate]), way * rate, self.iterations, 0.0, None, None
-        )
+        return OnPath(x, self.load(x), found, np.array([1.0 / rate]), way * rate, self.iterations, 0.0, None)
 
     def step(self, here, size):
         self.sizes.append(size)
@@ -67,7 +65,7 @@ class Curve:
             else:
                 high = middle
         found = self.at(high)
-        return OnPath(high, goal, found.equilibrium, found.tangent, found.rate, 4, 0.0, None, None)
+        return OnPath(high, goal, found.equilibrium, found.tangent, found.rate, 4, 0.0, None)
 
     def by_load(self, here, end):
         return None

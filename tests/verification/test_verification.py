@@ -7,7 +7,7 @@ from shellform import verification
 from shellform.structure.answers.stability import critical_load
 from shellform.structure.elements.state import at_rest
 from shellform.structure.network import assemble
-from shellform.structure.solve.loading import forces
+from shellform.structure.solve.drive import forces
 from shellform.verification import buckling, suites
 from shellform.verification.cables import hypar
 from shellform.verification.compared import Comparison

@@ -32,12 +32,14 @@ from shellform.structure.elements.state import State, at_rest, moved
 from shellform.structure.model import Model
 from shellform.structure.network import assemble, doubts, free_to_swing, lost_moments, swinging
 from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.drive import Drive, turns_half
 from shellform.structure.solve.dynamic import dynamic
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium, newton, stability
 from shellform.structure.solve.extended import fit_for
-from shellform.structure.solve.loading import Drive, advance, turns_half
+from shellform.structure.solve.loading import advance
 from shellform.structure.solve.path import follow
 from shellform.structure.solve.residual import Drowned, Turning
+from shellform.structure.solve.settled import settle
 from shellform.structure.solve.walk import Lead
 
 LIMIT = 1000  # factorisations of one relaxation
@@ -235,14 +237,14 @@ class _Analysis:
         path where moments without potential don't let the relaxation come to rest. Adds its `waypoints`.
         """
         try:
-            arrived = advance(
+            to_load = advance if len(self.swinging) else settle
+            arrived = to_load(
                 self.assembly,
                 self.state,
                 self.drive,
                 begin=before,
                 end=after,
                 tolerance=self.tolerance,
-                heeding=not len(self.swinging),
                 limit=min(self.limit, _TURNING) if self.turns else self.limit,
                 report=self._reporter(waypoints, before, after),
             )
@@ -263,7 +265,7 @@ class _Analysis:
         rest = Drive(change * self.drive.load, change * self.drive.imposed, self.drive.at(before))
         if self.followed_from is None:
             self.followed_from = before
-        points = follow(self.assembly, self.state, rest, tolerance=self.tolerance)
+        points = follow(self.assembly, self.state, rest, tolerance=self.tolerance, heeding=True)
         last = next(points)
         for last in points:
             factor = before + last.factor * change
@@ -288,6 +290,7 @@ class _Analysis:
             lead=lead,
             first=first,
             tolerance=self.tolerance,
+            heeding=True,
         )
         for point in points:
             spent = point.equilibrium.factorisations

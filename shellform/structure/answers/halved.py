@@ -27,8 +27,8 @@ from shellform.structure.elements.beam import STIFFNESSES, Beams
 from shellform.structure.elements.state import State, at_rest
 from shellform.structure.model import Model
 from shellform.structure.network import Network, assemble
+from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import find_equilibrium
-from shellform.structure.solve.loading import Drive
 
 _CORNER = np.radians(30.0)  # between two beams that don't stand for a curve
 

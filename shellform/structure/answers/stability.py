@@ -33,10 +33,10 @@ from shellform.arrays import Reals
 from shellform.errors import InputError, NotConverged, require_count
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium
 from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.factorisation import NotPositiveDefinite
-from shellform.structure.solve.loading import Drive
 from shellform.structure.solve.path import follow
 from shellform.structure.solve.residual import ResidualNorm, held
 from shellform.work_clock import Work, counts_as

@@ -28,7 +28,6 @@ from shellform.arrays import Reals
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.factorisation import Factor
-from shellform.structure.solve.loading import turns_between
 
 _MODES = 6  # the softest ones, through which the tangent is looked at
 _ROUNDS, _AGAIN = 8, 2  # of inverse iteration, at the beginning and from one state to the next
@@ -117,6 +116,16 @@ class Outlook:
         then = self.assembly.evaluate(moved(view.state, motion)).tangent
         assert then is not None
         return (then - view.values) / change
+
+
+def turns_between(before: float, after: float, mean: float) -> bool:
+    """Whether a cubic with the slopes `before` and `after`, of one sign, at its ends, and the `mean` slope
+    from one to the other, has slopes of the other sign on its way."""
+    # At the share t of the way its slope is before - 2 half t + square t².
+    half, square = 2.0 * before + after - 3.0 * mean, 3.0 * (before + after - 2.0 * mean)
+    if not (before * after > 0.0 and before * square > 0.0):
+        return False
+    return 0.0 < half / square < 1.0 and half * half > before * square
 
 
 def _first(size: int) -> Reals:

@@ -35,10 +35,11 @@ from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.structure.elements.state import State, extended
 from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import TOLERANCE
 from shellform.structure.solve.extended import with_twice_the_digits
-from shellform.structure.solve.loading import Drive, kinked, turns_between
-from shellform.structure.solve.outlook import WINDOW, View
+from shellform.structure.solve.leaps import kinked
+from shellform.structure.solve.outlook import WINDOW, View, turns_between
 from shellform.structure.solve.residual import ResidualNorm
 from shellform.structure.solve.walk import Doubted, Lead, Missed, OnPath, PathPoint, Walk
 
@@ -101,7 +102,7 @@ def follow(
             crossing = (here.factor - goal) * (there.factor - goal) <= 0.0 and there.factor != here.factor
             if lead is None and crossing:
                 there = walk.at_factor(here, there, goal)
-            seen, event = _events(walk, here, view, size, there) if events else (None, None)
+            seen, event = _looked_at(walk, here, view, size, there, events=events)
         except Missed as missed:
             doubted = missed.doubted or doubted
             size *= _SHORTEST
@@ -138,22 +139,22 @@ def _with_digits(assembly: Assembly, start: State, load: Reals, tolerance: float
     return precise, extended(start)
 
 
-def _events(
-    walk: Walk, here: OnPath, view: View | None, size: float, there: OnPath
+def _looked_at(
+    walk: Walk, here: OnPath, view: View | None, size: float, there: OnPath, *, events: bool
 ) -> tuple[View | None, PathPoint | None]:
-    """What is to be seen from `there`, where the step is heeded, since there is a `view` from `here`; and the
-    point of the step where the number of negative eigenvalues changes, if it does. Raises Missed where it may
-    have passed over an unstable stretch."""
+    """What is to be seen from `there`, where the step is heeded, since there is a `view` from `here`; and,
+    where `events` are asked for, the point of the step where the number of negative eigenvalues changes, if
+    it does. Raises Missed where it may have passed over an unstable stretch."""
     if view is not None and there.equilibrium.stable:
         return walk.heeded(here, view, there), None
-    found = None if there.negative == here.negative else walk.located(here, size, there)
+    if not events or there.negative == here.negative:
+        return None, None
+    found = walk.located(here, size, there)
     if view is not None:
         if found is None and walk.share(here, there) > WINDOW:
             raise Missed
         if found is not None and found[1] is not here:
-            last = found[1]
-            again = walk.point(last.state, last.factor, last.iterations)  # its factor was replaced
-            walk.heeded(here, view, replace(again, rate=last.rate), critical=True)
+            walk.heeded(here, view, found[1], critical=True)
     return None, None if found is None else found[0]
 
 

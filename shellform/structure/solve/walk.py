@@ -18,9 +18,11 @@ from shellform.errors import InputError, NotConverged
 from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly, Balance
+from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import TURN, Equilibrium
 from shellform.structure.solve.factorisation import Indefinite
-from shellform.structure.solve.loading import Drive, advance, kinked
+from shellform.structure.solve.leaps import kinked
+from shellform.structure.solve.loading import advance
 from shellform.structure.solve.outlook import Outlook, View
 from shellform.structure.solve.residual import STAGNANT, ResidualNorm, Turning, held, overturned
 
@@ -46,7 +48,7 @@ class PathPoint:
 @dataclass(frozen=True)
 class OnPath:
     """A point with what the next step needs: `tangent` (f,), the change of the free degrees of freedom with
-    the factor; the lower `values` of K and its factor, the `matrix`, good until the next one is made.
+    the factor; the lower `values` of K.
     """
 
     state: State
@@ -57,7 +59,6 @@ class OnPath:
     iterations: int
     turned: float
     values: Reals
-    matrix: Indefinite
 
     @property
     def negative(self) -> int:
@@ -99,6 +100,7 @@ class Walk:
         self.led = None if lead is None else self.number(lead)
         span = float(np.ptp(start.positions, axis=0).max())
         self.outlook = Outlook(assembly, span, self.measure.mass_shape)
+        self._made: tuple[Reals, Indefinite] | None = None  # the last factor and of which values it is
         self.first = 0.0  # change of the factor in the first step, below which none is a load to speak of
         self.direction = 1.0 if lead is not None or goal > 0.0 else -1.0
 
@@ -148,7 +150,7 @@ class Walk:
             )
         assert balance.tangent is not None
         rate, values = 1.0 / speed, balance.tangent
-        return OnPath(state, factor, found, tangent, rate, iterations, balance.turned, values, matrix)
+        return OnPath(state, factor, found, tangent, rate, iterations, balance.turned, values)
 
     def step(self, here: OnPath, size: float) -> OnPath:
         """The point at `size` from `here`. Raises Missed."""
@@ -216,6 +218,7 @@ class Walk:
         where an element turns too far."""
         if not here.equilibrium.stable:
             return None
+        self._made = None
         try:
             found = advance(
                 self.assembly,
@@ -243,7 +246,10 @@ class Walk:
         onward = self.drive.imposed.ravel().copy()
         onward[self.assembly.free] = here.tangent
         onward *= here.rate
-        return self.outlook.view(here.state, here.values, here.matrix, onward.reshape(-1, 6), before)
+        made = self._made
+        if made is None or made[0] is not here.values:  # it was replaced
+            made = here.values, self._factor(self.assembly.evaluate(here.state))
+        return self.outlook.view(here.state, here.values, made[1], onward.reshape(-1, 6), before)
 
     def heeded(self, here: OnPath, seen: View, there: OnPath, *, critical: bool = False) -> View:
         """What is to be seen from a stable point to which a step has led from one with the view `seen`.
@@ -318,7 +324,10 @@ class Walk:
 
     def _factor(self, balance: Balance) -> Indefinite:
         self.spent += 1
-        return self.assembly.matrix.factor_indefinite(held(self.assembly, balance))
+        factor = self.assembly.matrix.factor_indefinite(held(self.assembly, balance))
+        assert balance.tangent is not None
+        self._made = balance.tangent, factor
+        return factor
 
     def _drive(self, state: State) -> Reals:
         drive = self.drive.load

@@ -1,0 +1,87 @@
+"""A load along the stable branch, by increments and, where these end, by the path.
+
+Increments (loading.py) end where Newton's steps lose definiteness or don't come to rest, however short they
+are. So they do where the branch ends, but also beyond the kink of a cable that goes slack or taut, where a
+structure gets thousands of times as soft or as stiff. So the path is followed from the last stable state on
+(path.py): where it comes to the whole load without a point that isn't stable, the branch hasn't ended.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from shellform.errors import NotConverged
+from shellform.structure.elements.state import State
+from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.drive import Drive
+from shellform.structure.solve.equilibrium import TOLERANCE
+from shellform.structure.solve.leaps import at_rest
+from shellform.structure.solve.loading import SMALLEST, BranchPart, Loaded, Reached, follow_branch
+from shellform.structure.solve.path import FIRST, follow
+
+
+def settle(
+    assembly: Assembly,
+    start: State,
+    drive: Drive,
+    *,
+    begin: float = 0.0,
+    end: float = 1.0,
+    tolerance: float = TOLERANCE,
+    stay: bool = False,
+    limit: int = 1000,
+    report: Reached | None = None,
+) -> Loaded:
+    """As `advance`, heeding what increments may pass over; the stable branch ends where the path says so,
+    too, or can't be followed."""
+    way = follow_branch(
+        assembly,
+        start,
+        drive,
+        begin=begin,
+        end=end,
+        tolerance=tolerance,
+        heeding=True,
+        limit=limit,
+        report=report,
+    )
+    if way.share < 1.0:
+        way = _along_path(assembly, way, drive, begin, end, tolerance, report)
+    return way.ended(assembly, drive, begin, end, tolerance, stay=stay, limit=limit, report=report)
+
+
+def _along_path(
+    assembly: Assembly,
+    way: BranchPart,
+    drive: Drive,
+    begin: float,
+    end: float,
+    tolerance: float,
+    report: Reached | None,
+) -> BranchPart:
+    """The way followed to its end where the path from there on is stable up to it, else as it is but for the
+    factorisations."""
+    here, share = begin + way.share * (end - begin), way.share
+    base, change = drive.at(here), end - here
+    if not at_rest(assembly, way.state, base):
+        return way
+    rest, passed, spent = Drive(change * drive.load, change * drive.imposed, base), [], 0
+    first = min(FIRST, SMALLEST / (1.0 - share))
+    try:
+        for point in follow(
+            assembly, way.state, rest, first=first, tolerance=tolerance, events=False, heeding=True
+        ):
+            spent = point.equilibrium.factorisations
+            if not point.equilibrium.stable:
+                break
+            passed.append((share + point.factor * (1.0 - share), point.equilibrium))
+    except NotConverged as error:
+        spent = error.iterations
+    spent += way.factorisations
+    if not passed or passed[-1][0] < 1.0:
+        return replace(way, factorisations=spent)
+    if report is not None:
+        for each in passed[1:]:
+            report(*each)
+    last = passed[-1][1]
+    return BranchPart(1.0, last.state, last, spent)
