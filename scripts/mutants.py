@@ -362,13 +362,12 @@ class Planter:
             told = self._forked(fault, chosen, last)
             if told is None or not told.startswith(_DEATH):
                 return told
-            sound = self._forked(fault, chosen, last, planted=False)
+            name = told.split(" in ", 1)[1]
+            sound = self._forked(fault, [items[name]], last, planted=False) if name in items else ""
             if not sound:
                 return told
-            name = sound.split(" in ", 1)[1] if sound.startswith(_DEATH) else sound
             print(f"left out: {sound} without any fault", file=self.told, flush=True)
-            if self._itself.pop(name, None) is None:
-                return None
+            self._itself.pop(name)
 
     def _run(self, item: pytest.Item, following: pytest.Item) -> None:
         item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
@@ -415,12 +414,18 @@ class Planter:
         found = found.split(_NEXT)[-1]
         return None if found == "not planted" else found
 
+    def _longest_wait(self, item: pytest.Item) -> int:
+        """Seconds on the clock after which a test waits for ever. Fixtures that another test of its file had
+        made may be made in it."""
+        file = item.nodeid.split("::")[0]
+        beside = max(waited for name, waited in self._waited.items() if name.split("::")[0] == file)
+        return int(5.0 * self._waited[item.nodeid] + 2.0 * beside) + 30
+
     def _child(
         self, fault: Fault, items: Sequence[pytest.Item], last: pytest.Item, told: int, planted: bool
     ) -> str:
         longest = int(time.process_time() + 10.0 * sum(self._seconds[item.nodeid] for item in items)) + 60
         resource.setrlimit(resource.RLIMIT_CPU, (longest, longest))
-        waiting = int(5.0 * max(self._waited[item.nodeid] for item in items)) + 60
         try:
             if planted and not plant(fault):
                 return "not planted"
@@ -432,7 +437,7 @@ class Planter:
                 fixture.cached_result = None
         for k, item in enumerate(items):
             self.failed = ""
-            signal.alarm(waiting)  # for one that waits for ever
+            signal.alarm(self._longest_wait(item))
             os.write(told, f"{_NEXT}{item.nodeid}".encode())
             self._run(item, items[k + 1] if k + 1 < len(items) else last)
             if self.failed:
