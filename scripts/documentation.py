@@ -256,7 +256,12 @@ def names() -> str:
         rooms["study"].append((f"study.{name}", f"{home}.{original}"))
     text = [
         "# Python\n\nThe public names, `import shellform as sf`, by room; written from their "
-        "docstrings. Lengths are in m, forces in N, angles in rad. Each name is loaded when it is first used.\n"
+        "docstrings. Lengths are in m, forces in N, angles in rad. Each name is loaded when it is first used.\n\n"
+        "A record that holds arrays, itself or in a record inside it, equals itself only: `design == other` is "
+        "`design is other`, and `in`, `set` and dictionaries go by that. Compare numbers: "
+        "`np.array_equal(design.rest_length, other.rest_length)`. Its arrays are read-only, copied and unpickled "
+        "as well; `dataclasses.replace(design, radius=0.0012)` makes another. Records of numbers and names alone, "
+        "such as `Rod`, are equal where these are.\n"
     ]
     for room in sorted(rooms):
         text.append(f"## {room}\n")

@@ -1,4 +1,6 @@
-"""Checks at the door: every array of a dataclass passes here once and is read-only afterwards."""
+"""Checks at the door: every array of a dataclass passes here once and is read-only afterwards, in copies of
+it as well.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +21,20 @@ Flags = NDArray[np.bool_]
 
 Shape = Sequence[int | None]
 _T = TypeVar("_T", bound=np.generic)
+
+
+class Record:
+    """A frozen dataclass that holds arrays. It is made with eq=False, for a comparison of arrays has no one
+    truth value: it equals itself only. NumPy unpickles and copies a read-only array as a writable one; here
+    it becomes read-only again.
+    """
+
+    __eq__ = object.__eq__  # and not that of another base, which compares its own fields only
+    __hash__ = object.__hash__
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            object.__setattr__(self, name, _locked(value))
 
 
 def reals(name: str, value: ArrayLike, shape: Shape, *, positive: bool = False) -> Reals:
@@ -96,6 +112,18 @@ def frozen(raw: NDArray[_T]) -> NDArray[_T]:
     copy = np.array(raw, order="C", copy=True)
     copy.setflags(write=False)
     return copy
+
+
+def _locked(value: Any) -> Any:
+    """`value`, the arrays in it read-only."""
+    if isinstance(value, np.ndarray):
+        value.setflags(write=False)
+    elif type(value) is tuple:
+        for each in value:
+            _locked(each)
+    elif type(value) is dict:
+        _locked(tuple(value.values()))
+    return value
 
 
 class Arrays(dict[str, Any]):

@@ -27,7 +27,7 @@ Rod = Section | Sequence[float] | Reals
 _Lines = list[tuple[int, int, dict[str, float]]]  # two nodes, and what the line has of its own
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OwnNetwork:
     """A `model`, and the `keys` (n,) that its nodes had where they came from, in order."""
 

@@ -1,12 +1,25 @@
 """What is checked at the door of the package."""
 
+import collections.abc
+import copy
+import inspect
 import os
+import pickle
+import pkgutil
+import sys
+import typing
+from dataclasses import fields, is_dataclass
+from functools import cache
+from importlib import import_module
 
 import numpy as np
 import pytest
+from scipy import sparse
 
-from shellform.arrays import flags, indices, read_arrays, reals
+import shellform
+from shellform.arrays import Record, flags, indices, read_arrays, reals
 from shellform.errors import Damaged, InputError
+from shellform.structure.answers.increments import Reached
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0])
@@ -117,3 +130,68 @@ def test_a_broken_file_of_arrays_is_not_left_open(tmp_path):
         read_arrays(file)
     assert os.listdir("/dev/fd") == before, "while somebody still looks at what was said"
     assert told.value.where == str(file)
+
+
+@cache
+def dataclasses() -> list[type]:
+    """Every dataclass of the package, public or not."""
+    modules = [import_module(each.name) for each in pkgutil.walk_packages(shellform.__path__, "shellform.")]
+    classes = [each for module in modules for each in vars(module).values() if inspect.isclass(each)]
+    return [each for each in dict.fromkeys(classes) if is_dataclass(each)]
+
+
+@cache
+def held(made: type) -> list[object]:
+    """What the fields of a dataclass hold, classes that are imported for type checkers only included."""
+    known = {name for each in made.__mro__ for name in vars(sys.modules[each.__module__])}
+    unknown = {each.__name__: each for each in dataclasses() if each.__name__ not in known}
+    hints = typing.get_type_hints(made, localns={"ClassVar": typing.ClassVar, **unknown})
+    return [hints[each.name] for each in fields(made)]
+
+
+def holds(hint: object, *, within: bool, seen: tuple[object, ...] = ()) -> bool:
+    """Whether a value of this type holds arrays: itself, in a tuple or a mapping, or `within` a record."""
+    kind = typing.get_origin(hint) or hint
+    parts = typing.get_args(hint)
+    if kind is collections.abc.Callable or kind in seen:
+        return False
+    if inspect.isclass(kind) and issubclass(kind, np.ndarray | sparse.sparray if within else np.ndarray):
+        return True
+    if is_dataclass(kind):
+        parts, seen = (held(kind) if within else []), (*seen, kind)
+    return any(holds(part, within=within, seen=seen) for part in parts)
+
+
+def test_every_dataclass_that_holds_arrays_equals_itself_only_and_keeps_them_read_only_in_copies():
+    compared, writable, seen = [], [], set()
+    for made in dataclasses():
+        if any(holds(each, within=True) for each in held(made)):
+            seen.add(made.__name__)
+            if made.__eq__ is not object.__eq__ or made.__hash__ is not object.__hash__:
+                compared.append(f"{made.__module__}.{made.__name__}")
+        own = made.__dataclass_params__.frozen and any(holds(each, within=False) for each in held(made))
+        if own and not issubclass(made, Record):
+            writable.append(f"{made.__module__}.{made.__name__}")
+    assert {"Design", "Gridshell", "Net", "Optimum", "Measurement", "Run"} <= seen
+    assert not compared, "pass eq=False to @dataclass: " + ", ".join(compared)
+    assert not writable, "derive from arrays.Record: " + ", ".join(writable)
+
+
+def test_a_record_of_arrays_is_found_among_others_by_which_it_is(dome):
+    design, other = dome.design(rest_ratio=0.98), dome.design(rest_ratio=0.98)
+    assert design in [other, design]
+    assert design != other
+    assert {design: "one", other: "another"}[design] == "one"
+    assert len({dome, dome.net, dome.net.grid, dome}) == 3
+
+
+@pytest.mark.parametrize("again", [lambda each: pickle.loads(pickle.dumps(each)), copy.deepcopy, copy.copy])
+def test_the_arrays_of_a_copied_or_unpickled_record_stay_read_only(dome, again):
+    shell, design = again(dome), again(dome.design())
+    rod = shell.net.grid.rods[0]
+    moved = again(Reached(1.0, 3, {5: reals("moved", [0.0, 0.0, -0.1], (3,))}, True, 0)).displacements[5]
+    for array in (shell.cable_ends, shell.target.positions, rod.nodes, design.rest_length, moved):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+    np.testing.assert_array_equal(rod.arc, dome.net.grid.rods[0].arc)
+    assert shell.rod == dome.rod

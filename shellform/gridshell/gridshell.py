@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shellform.arrays import Flags, Indices, Reals, flags, indices, reals
+from shellform.arrays import Flags, Indices, Reals, Record, flags, indices, reals
 from shellform.errors import InputError, require_number
 from shellform.gridshell.edge_beams import EdgeBeam, edge_beams
 from shellform.gridshell.layers import LOCK, locks, rod_bending_stress, rod_forces, rod_stress
@@ -146,8 +146,8 @@ class Cable:
         )
 
 
-@dataclass(frozen=True)
-class Design:
+@dataclass(frozen=True, eq=False)
+class Design(Record):
     """What is designed: `rest_length` (c,), m, of every candidate cable, which of them exist, and the rods'
     `radius`, m.
     """
@@ -172,8 +172,8 @@ class Design:
         return f"Design({cables}, rods of {1e3 * self.radius:.4g} mm radius)"
 
 
-@dataclass(frozen=True)
-class Gridshell:
+@dataclass(frozen=True, eq=False)
+class Gridshell(Record):
     """A net with its rod, joint and candidate cables: `cable_ends` (c, 2) nodes, `cable_lengths` (c,), m, in
     the target; `edge`, what its edge beams are (None where the net has none, whatever was given).
     """

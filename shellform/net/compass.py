@@ -21,7 +21,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError
 from shellform.net.refusal import NoNet, Reason
 
@@ -45,8 +45,8 @@ class Finder(Protocol):
         """The same as if the surface had no openings."""
 
 
-@dataclass(frozen=True)
-class Guide:
+@dataclass(frozen=True, eq=False)
+class Guide(Record):
     """A guide from the origin on: its first `direction` (3,) along the surface and, if it isn't to run
     straight, the corners of its `plan` (k, 2), m, which begin at the origin."""
 

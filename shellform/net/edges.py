@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Reals, reals
+from shellform.arrays import Reals, Record, reals
 from shellform.errors import InputError, require_known
 from shellform.net.net import EdgeLine, Net, Stretch
 from shellform.net.polylines import nearest
@@ -46,8 +46,8 @@ _STEEP = 0.1  # fall over length in plan: edges that stand on the ground, but un
 _CLOSE = 0.2
 
 
-@dataclass(frozen=True)
-class Place:
+@dataclass(frozen=True, eq=False)
+class Place(Record):
     """Where a `kind` of edge is: where all that is given holds. `height`: lowest and highest level, m; `box`:
     two opposite corners (2, 3), m; `curve`: a plan curve (k, 2), m, no farther than `within`, m; `opening`:
     on the edge of an opening, or on the outer one."""
@@ -78,7 +78,7 @@ class Place:
         return inside
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Edges:
     """`places` with their kinds, the first that holds deciding; elsewhere `outer` edges and edges of
     `openings` have a kind of `KINDS`, or "auto" the one that the geometry says; `ground`, m, its level (None:

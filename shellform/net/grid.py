@@ -13,15 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals, frozen, indices, reals
+from shellform.arrays import Indices, Reals, Record, frozen, indices, reals
 from shellform.structure.elements.beam import Beams, make_beams
 from shellform.structure.elements.state import State
 
 ROD, CONNECTOR = "rod", "connector"  # kinds of beams
 
 
-@dataclass(frozen=True)
-class GridRod:
+@dataclass(frozen=True, eq=False)
+class GridRod(Record):
     """One straight rod: `direction` "u" or "v", lattice `index` it shares, `nodes` (k,) from end to end,
     their distances `arc` (k,), m, from the first end, and the numbers of the `crossings` (c,) along it with
     their places `at` (c,) among the nodes."""
@@ -48,8 +48,8 @@ class GridRod:
         return self.arc[self.at]
 
 
-@dataclass(frozen=True)
-class Grid:
+@dataclass(frozen=True, eq=False)
+class Grid(Record):
     """`flat` (n, 3), m, all nodes in the stress-free state; `rods`; `lattice` (c, 2) places of the crossings
     and `crossing_nodes` (c, 2) their nodes on the u rod and on the v rod; `spacing` of crossings along u rods
     and `spacing_v` along v rods (0: the same), `gap`, m."""

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from shellform.arrays import Reals, reals
+from shellform.arrays import Reals, Record, reals
 from shellform.errors import InputError
 from shellform.net.compass import Finder, Guide, raised
 from shellform.surface.shape.target import Surface, triangle_areas
 
 
-@dataclass(frozen=True)
-class LatticeOrigin:
+@dataclass(frozen=True, eq=False)
+class LatticeOrigin(Record):
     """The `point` (3,), m, on the surface; the `frame` (3, 3) of u, v and normal there, as columns; and the
     `guides` from it forwards and backwards along u, then along v."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals, indices, reals
+from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.net.grid import Grid, crossing_points
 from shellform.net.notes import NetNote
 from shellform.net.quality import Quality
@@ -15,8 +15,8 @@ from shellform.net.refusal import Attempt
 from shellform.structure.elements.state import State
 
 
-@dataclass(frozen=True)
-class EdgeLine:
+@dataclass(frozen=True, eq=False)
+class EdgeLine(Record):
     """The axis of an edge beam: its `nodes` (k,) in order, `closed` to a ring or from foot to foot; `clamps`
     (c, 2): pairs of one of its nodes and the rod's end that is clamped to it; its `name`, if it has one."""
 
@@ -38,8 +38,8 @@ class EdgeLine:
         return pairs if self.closed else pairs[:-1]
 
 
-@dataclass(frozen=True)
-class Stretch:
+@dataclass(frozen=True, eq=False)
+class Stretch(Record):
     """A part of the edge of one `kind` (edges.py): its `name` in the case, if it has one; its `points` (k,
     3), m, in order; whether it goes round an `opening`, and whether it is the `whole` closed curve."""
 
@@ -58,8 +58,8 @@ class Stretch:
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
 
-@dataclass(frozen=True)
-class Net:
+@dataclass(frozen=True, eq=False)
+class Net(Record):
     """A grid of rods that lies on a surface.
 
     - `grid`: flat; `target`: its state on the surface, (n,) nodes.

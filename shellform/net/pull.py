@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.errors import NotConverged
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, grid_beams
@@ -50,8 +50,8 @@ Pulling = Callable[[str, float], None]
 """Called while a net is pulled with what is done and the residual."""
 
 
-@dataclass(frozen=True)
-class Pulled:
+@dataclass(frozen=True, eq=False)
+class Pulled(Record):
     """The grid's state on the surface: `curvature` (m, 2, 2), 1/m, at the two ends of each rod element out of
     and in the surface's tangent plane, `pull` (n,), the spring force on each node in EI/s², and the
     `factorisations` it took."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from shellform.arrays import Reals, reals
+from shellform.arrays import Reals, Record, reals
 from shellform.errors import how_many
 from shellform.net.compass import Finder, gaussian
 from shellform.net.grid import Grid, cells, crossing_points, neighbours
@@ -61,8 +61,8 @@ class NetNumbers:
     factorisations: int
 
 
-@dataclass(frozen=True)
-class Quality(NetNumbers):
+@dataclass(frozen=True, eq=False)
+class Quality(Record, NetNumbers):
     """The numbers, and what maps show: `distance` (c,), signed, and `shear_angle` (c,) of crossings;
     `spacing_error` (p,), signed, of the pairs of neighbours; `curvature` (m, 2, 2) of rod elements at their
     two ends, out of and in plane; `pull` (n,) of nodes."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.net.net import Net
 from shellform.net.polylines import closed, nearest
 from shellform.structure.elements.rotation import matrices
@@ -19,7 +19,7 @@ _OFF = 0.5  # of the spacing: an end farther from the surface's edge was cut off
 _APART = 2.5  # of the spacing: where a net was cut off, ends farther from one another are on two edges
 
 
-@dataclass
+@dataclass(eq=False)
 class Rim:
     """A closed curve on which rods end.
 
@@ -39,8 +39,8 @@ class Rim:
     along: Reals
 
 
-@dataclass(frozen=True)
-class End:
+@dataclass(frozen=True, eq=False)
+class End(Record):
     """A rod's end: its `node`, the `rim` that it lies on, its arc length `at` on it, m, the `vertex` of the
     rim that is nearest, and its `middle` (3,) on the edge, m."""
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals, indices, reals
+from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.structure.elements.parts import Evaluation
 from shellform.structure.elements.state import State
 
@@ -27,8 +27,8 @@ Distance = Callable[[Reals], tuple[Reals, Reals, Reals]]
 _LOWER = np.tril_indices(3)
 
 
-@dataclass(frozen=True)
-class SlidingSprings:
+@dataclass(frozen=True, eq=False)
+class SlidingSprings(Record):
     """`nodes` (k,) pulled with `density` (k,) N/m to lie at `level` (k,) m above the surface of
     `distance`.
     """

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.errors import how_many
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, GridRod
@@ -43,7 +43,7 @@ class Uncovered(Exception):
         self.rods = rods
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Piece:
     """Part of a rod of the oversized grid on the surface: its inner nodes `first` to `last` (places on the
     rod) and the arc lengths `start`, `end` at which it is cut."""
@@ -63,8 +63,8 @@ class _Piece:
         ]
 
 
-@dataclass(frozen=True)
-class Trimmed:
+@dataclass(frozen=True, eq=False)
+class Trimmed(Record):
     """`grid` and its `state`; `supports` (s,) end nodes; `origin` (n,) the node of the oversized grid that
     each node was (-1 for cut ends); `notes`."""
 
@@ -75,8 +75,8 @@ class Trimmed:
     notes: tuple[NetNote, ...]
 
 
-@dataclass(frozen=True)
-class Limits:
+@dataclass(frozen=True, eq=False)
+class Limits(Record):
     """Where rods end besides the surface's edge: the `ground`, m, below which nothing is built, and the
     corners of a closed curve in `plan` (k, 2), m, outside which nothing is."""
 

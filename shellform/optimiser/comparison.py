@@ -106,7 +106,7 @@ class Plain:
             self.points.append(point)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Compared:
     """What a SciPy `method` found.
 

@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.structure.answers.sensitivity import (
     Response,
     adjoint,
@@ -50,8 +50,8 @@ class Guard(Protocol):
         """Changes (g,), N, of the tensions by a change (c + r,), m, of the design."""
 
 
-@dataclass(frozen=True)
-class WholeGuard:
+@dataclass(frozen=True, eq=False)
+class WholeGuard(Record):
     """With all derivatives as a dense matrix, `tension_by_design` (g, c + r), N/m."""
 
     tension: Reals
@@ -66,8 +66,8 @@ class WholeGuard:
         return np.asarray(self.tension_by_design @ design)
 
 
-@dataclass(frozen=True)
-class SolvedGuard:
+@dataclass(frozen=True, eq=False)
+class SolvedGuard(Record):
     """With solves when they are asked for, in the equilibrium of the `response`. The guarded cables are
     numbered `near` (g,) among those present; `by_state` (g, f) and `by_own` (g,), N/m, are their tensions'
     derivatives by the free degrees of freedom and by their own rest lengths."""

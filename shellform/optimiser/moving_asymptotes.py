@@ -34,7 +34,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.convex import minimise
@@ -77,8 +77,8 @@ class MovingAsymptotes:
         check_settings(self)
 
 
-@dataclass(frozen=True)
-class _Told:
+@dataclass(frozen=True, eq=False)
+class _Told(Record):
     """What MMA was told of a trial: the `variables` (s,), the `objective` and its `slope` (s,), `rows` (k,)
     of the constraints and their slopes (k, s)."""
 
@@ -89,7 +89,7 @@ class _Told:
     row_slopes: Reals
 
 
-@dataclass
+@dataclass(eq=False)
 class _Search:
     """A search and where it stands, changed in place since NLopt calls back.
 

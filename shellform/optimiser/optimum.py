@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design
 from shellform.problem.problem import Problem
@@ -40,8 +40,8 @@ class Step:
     phase: str = ""
 
 
-@dataclass(frozen=True)
-class Checkpoint:
+@dataclass(frozen=True, eq=False)
+class Checkpoint(Record):
     """Where an optimisation stood before a trial: `numbers` and words by name, `arrays` by name, and the
     `history` so far.
     """
@@ -60,7 +60,7 @@ class Checkpoint:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Optimum:
     """What an optimisation found.
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.optimiser.convex import minimise
 from shellform.optimiser.guards import Guard, SolvedGuard
 from shellform.optimiser.quadratic import LowRank, minimise_quadratic
@@ -37,8 +37,8 @@ _LET = 1e-3  # of the least tension, by which a cable that isn't guarded yet may
 _NONE = 1e-3  # of the mean tension: less is none, which MMA leaves of cables that die
 
 
-@dataclass(frozen=True)
-class Task:
+@dataclass(frozen=True, eq=False)
+class Task(Record):
     """What a step is asked for.
 
     - `solver`: the settings; `model`: of the design from which it goes; `window`, N, within which it stays.

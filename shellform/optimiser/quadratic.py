@@ -16,7 +16,7 @@ import numpy as np
 from cvxopt import matrix, solvers
 from scipy.linalg import cho_factor, cho_solve
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.work_clock import Work, counts_as
 
 _REGULAR = 1e-8  # of the mean curvature, where the model has none
@@ -28,8 +28,8 @@ _Linear = Callable[[Reals], Reals]
 _Condensed = Callable[[Reals, Reals], _Linear]
 
 
-@dataclass(frozen=True)
-class LowRank:
+@dataclass(frozen=True, eq=False)
+class LowRank(Record):
     """The matrix L L' of `columns` L (s, r)."""
 
     columns: Reals

@@ -31,7 +31,7 @@ from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.network import assemble
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CandidateSection:
     """A section of the catalogue that is tried.
 

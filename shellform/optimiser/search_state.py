@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.guards import Guard, solved_guard, whole_guard
@@ -35,8 +35,8 @@ _MAY_MISS = 0.02  # of an aim: along its edge a step that is judged to the last 
 _NEARLY = 0.01  # of the stiffness left, to which the end of their branch is sought
 
 
-@dataclass(frozen=True)
-class Search:
+@dataclass(frozen=True, eq=False)
+class Search(Record):
     """What stays the same in a search.
 
     The problem:
@@ -94,8 +94,8 @@ class Search:
         return self.evaluations - self.evaluator.evaluations
 
 
-@dataclass(frozen=True)
-class Accepted:
+@dataclass(frozen=True, eq=False)
+class Accepted(Record):
     """An accepted `design`, the candidates (c,) that are `taut` in it under the design load, by what share it
     breaks its constraints, its `violation`, and its `objective`."""
 
@@ -110,8 +110,8 @@ class Accepted:
         return replace(self.design, present=self.taut)
 
 
-@dataclass(frozen=True)
-class Iterate:
+@dataclass(frozen=True, eq=False)
+class Iterate(Record):
     """Where a search stands.
 
     - `point`: the present design; `accepted`: all designs up to it; `history`: all trials.

@@ -25,6 +25,7 @@ from shellform.arrays import Reals
 from shellform.optimiser.quadratic import LowRank
 from shellform.optimiser.step_setting import Quadratic, Setting
 from shellform.problem.terms import Squares
+from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.eased_cables import EasedCables
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite, Symmetric
 
@@ -34,7 +35,7 @@ _SEED = 17
 _NOTHING = 1e-10  # of the largest: what rounding leaves
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SolvedAnswers:
     """Answers in the `setting` by the `factor` of K_t; `quadratics` of sums of squares."""
 
@@ -116,7 +117,7 @@ class SolvedAnswers:
 
 def solved_answers(at: Setting, residuals: Sequence[Squares]) -> SolvedAnswers:
     """The answers in the setting, for these sums of squares."""
-    parts = [EasedCables(part) if part in at.assembly.cables else part for part in at.assembly.parts]
+    parts = [EasedCables(part) if isinstance(part, Cables) else part for part in at.assembly.parts]
     values = at.assembly.with_parts(parts).evaluate(at.state).tangent
     assert values is not None
     # a family of its own, whose factor serves as long as the model does

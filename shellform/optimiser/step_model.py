@@ -28,7 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.solved_answers import solved_answers
 from shellform.optimiser.step_setting import Answers, Quadratic, setting
@@ -41,8 +41,8 @@ from shellform.structure.solve.assembly import Assembly
 _DEAD = 1e-6  # of the cables' stiffness: a tension below it counts as none
 
 
-@dataclass(frozen=True)
-class StepModel:
+@dataclass(frozen=True, eq=False)
+class StepModel(Record):
     """The model at a `point`, in y = (tensions (c,), N, of the present cables; values of the other blocks).
 
     - `evaluator` of the problem; `assembly` and `state` of the point under the design load.

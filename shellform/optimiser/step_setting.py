@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.optimiser.quadratic import LowRank
 from shellform.problem.evaluation import Evaluated, Evaluator
 from shellform.structure.answers.sensitivity import by_rest_length, element_columns, force_by_stiffness
@@ -22,8 +22,8 @@ from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
 
 
-@dataclass(frozen=True)
-class Setting:
+@dataclass(frozen=True, eq=False)
+class Setting(Record):
     """Where a step begins: a `point` under the design load, and what moves it.
 
     y = (tensions (n,) of the present cables; values of the other blocks).
@@ -66,8 +66,8 @@ class Setting:
         return sp.csr_array(sp.csr_array(self.rates)[kept])
 
 
-@dataclass(frozen=True)
-class Quadratic:
+@dataclass(frozen=True, eq=False)
+class Quadratic(Record):
     """A sum of squares in the model: its `slope` (y,) and Gauss-Newton matrix `hessian` (y, y)."""
 
     slope: Reals

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.optimiser.step_setting import Quadratic, Setting
 from shellform.problem.terms import Squares
 from shellform.structure.elements.state import State
@@ -22,8 +22,8 @@ from shellform.structure.solve.assembly import Assembly
 _BLOCK = 256  # columns solved for at once
 
 
-@dataclass(frozen=True)
-class WholeAnswers:
+@dataclass(frozen=True, eq=False)
+class WholeAnswers(Record):
     """Answers in the `setting` from `length_by_y` (c, y), `variables_by_y` (s, y), `parameters_by_y` (p, y);
     `middle` (n, y), the changes of tension that make K's answer to them K_t's; `quadratics` of sums of
     squares."""

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Flags, Reals
+from shellform.arrays import Flags, Reals, Record
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.problem.constraints import residual_rows, residuals
@@ -57,8 +57,8 @@ class OffBranch(Exception):
     """A trial design whose equilibrium isn't on the stable branch."""
 
 
-@dataclass(frozen=True)
-class Evaluated:
+@dataclass(frozen=True, eq=False)
+class Evaluated(Record):
     """A design on the stable branch with the values of its `problem`: `variables` (s,), `states` by load case
     at a `stage`, `objective`, its weighted `terms`, `constraints` (k,), residuals at most 0 where met; and
     the `measurements` of all the problem's terms."""
@@ -91,7 +91,7 @@ class Evaluated:
         return self.measurements[: len(self.problem.minimise)]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Linearisation(Evaluated):
     """The same with its first derivatives (appendix A): `objective_by_variables` (s,),
     `constraints_by_variables` (k, s)."""
@@ -100,7 +100,7 @@ class Linearisation(Evaluated):
     constraints_by_variables: Reals
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Tried:
     """The stable equilibrium that was found next to a start, None where there is none, and `why`; the
     `factorisations` that it took."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals, reals
+from shellform.arrays import Reals, Record, reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Gridshell
 from shellform.problem.constraints import Constraint, count
@@ -19,8 +19,8 @@ from shellform.problem.variables import RestLengths, Variable
 FEASIBLE = 1e-3  # largest violation, over the limit, of a design that counts as feasible
 
 
-@dataclass(frozen=True)
-class LoadCase:
+@dataclass(frozen=True, eq=False)
+class LoadCase(Record):
     """A `name` by which terms refer to the dead load `force` (n, 6), N and Nm."""
 
     name: str
@@ -38,7 +38,7 @@ class LoadCase:
         return f"LoadCase({self.name!r}, {loaded} of {len(self.force)} nodes loaded)"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Problem:
     """Minimise the sum of `minimise`, subject to `constraints`, over the `variables` of a `shell` that bears
     the `design_load` and `further` load cases.

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Reals, indices
+from shellform.arrays import Reals, Record, indices
 from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.structure.elements.state import State
@@ -24,8 +24,8 @@ from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
 
 
-@dataclass(frozen=True)
-class LoadedDesign:
+@dataclass(frozen=True, eq=False)
+class LoadedDesign(Record):
     """What a term is taken of: a `design` of the `shell` in its equilibrium `state` under the dead `load`
     (n, 6), N and Nm; `assembly` of the design's network where whoever measures has it."""
 
@@ -40,8 +40,8 @@ class LoadedDesign:
         return self.assembly or assemble(self.shell.network(self.design))
 
 
-@dataclass(frozen=True)
-class Squares:
+@dataclass(frozen=True, eq=False)
+class Squares(Record):
     """A value that is the sum of squares of residuals: `residual` (m,) and `by_dof` (m, 6 n) sparse. The step
     model takes its curvature from them (Gauss-Newton)."""
 
@@ -49,8 +49,8 @@ class Squares:
     by_dof: sp.csr_array
 
 
-@dataclass(frozen=True)
-class Measurement:
+@dataclass(frozen=True, eq=False)
+class Measurement(Record):
     """The `value` (g,) of a term and its partial derivatives: `by_dof` (g, 6 n) sparse, by the nodes'
     translations and spins at a fixed design; `by_rest_length` (g, c) sparse, of all candidate cables, and
     `by_radius` (g,) at a fixed state; None stands for 0.

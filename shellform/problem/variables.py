@@ -17,15 +17,15 @@ from typing import ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 
 _SAME = 1e-9  # relative
 
 
-@dataclass(frozen=True)
-class Rates:
+@dataclass(frozen=True, eq=False)
+class Rates(Record):
     """What the model's parameters change with the values of a block (v,): `rest_length` (c, v) sparse, of all
     candidate cables, and the rods' `radius` (v,); None stands for 0."""
 

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import NotConverged
 from shellform.reliability.branch import ON_THE_WAY, Here
 from shellform.reliability.path_of_one import Loading
@@ -49,8 +49,8 @@ _NEAR = 1 / 16  # … as may those from a state of a design nearby
 _SETTLING = 8  # factorisations of that state in this design
 
 
-@dataclass(frozen=True)
-class BorneFactor:
+@dataclass(frozen=True, eq=False)
+class BorneFactor(Record):
     """How much of a load a structure bears: the `factor`; by all rest lengths of the present cables
     `factor_by_rest_length` (p,), 1/m, and `factor_by_rate` (k,) by variables on which the beams' stiffness
     depends. Both are 0 where the branch goes on beyond what was asked for."""
@@ -60,8 +60,8 @@ class BorneFactor:
     factor_by_rate: Reals
 
 
-@dataclass(frozen=True)
-class _Point:
+@dataclass(frozen=True, eq=False)
+class _Point(Record):
     """A state on the branch at the load `factor`, its softest mode's `stiffness`, N/m, and `shape` (6 n, 1)
     with unit mass, and which cables (p,) are `taut`."""
 
@@ -72,8 +72,8 @@ class _Point:
     taut: Flags
 
 
-@dataclass(frozen=True)
-class _End:
+@dataclass(frozen=True, eq=False)
+class _End(Record):
     """What ends the branch: derivatives of the softest stiffness or of a cable's stretch `by_dof` (6 n,),
     `by_rest_length` (p,) and `by_rate` (k,) at a fixed state."""
 

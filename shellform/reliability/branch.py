@@ -30,7 +30,7 @@ _LEAST, _MOST = 0.01, 1e4  # of the first mass: less is none, and more leads now
 Foreseen = tuple[Reals, ...] | None  # deformations of each part of beams
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Here:
     """A state on the stable branch with its balance and its tangent's factor, good until the next one is
     made.

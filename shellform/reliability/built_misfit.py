@@ -50,7 +50,7 @@ PAIRS_OF_DEVIATIONS = 48  # the same where deviations are added, which few struc
 FIRST = 50_000  # the number from which on they are drawn: neither those that a search tries nor fresh ones
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BuiltMisfit(Term):
     """The mean misfit, m², of structures with some `errors` under the load case `load`, and so many standard
     `deviations` of it, to first order about the perfect structure's equilibrium; their shapes have these

@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Reals, reals
+from shellform.arrays import Reals, Record, reals
 from shellform.errors import require_count
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.members import Members
@@ -45,8 +45,8 @@ _LEAST = 0.2  # of an element's length is left to it by errors of marks
 _LEAST_CABLE = 0.05  # of a cable's rest length
 
 
-@dataclass(frozen=True)
-class Errors:
+@dataclass(frozen=True, eq=False)
+class Errors(Record):
     """What one structure is off by: `cable_length` (c,) m and `cable_stiffness` (c,) factors of all candidate
     cables, `supports` (n, 6) m, `beam_length` (m,) m, `beam_stiffness` (m,) factors, `beam_curvature` (m, 2)
     1/m about each beam's local y and z axes, `load` (n,) factors, `shape` (k,) m, the amplitudes of the
@@ -62,8 +62,8 @@ class Errors:
     shape: Reals
 
 
-@dataclass(frozen=True)
-class Imperfections:
+@dataclass(frozen=True, eq=False)
+class Imperfections(Record):
     """Shapes (k, n, 6), the largest translation of each 1, and the unloaded `state` on which they are
     imposed.
     """

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from shellform.arrays import Indices, Reals, reals
+from shellform.arrays import Indices, Reals, Record, reals
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.parts import Evaluation
 from shellform.structure.elements.state import State
@@ -27,8 +27,8 @@ from shellform.structure.elements.state import State
 _ROWS, _COLUMNS = np.tril_indices(6)
 
 
-@dataclass(frozen=True)
-class ExpectedCables:
+@dataclass(frozen=True, eq=False)
+class ExpectedCables(Record):
     """`cables` whose stretch is off by the standard `deviation` (c,), m, above zero."""
 
     cables: Cables

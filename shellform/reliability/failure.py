@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import built_cables, errors_of, variables
@@ -29,8 +29,8 @@ from shellform.structure.network import assemble
 _MOST = 1.5  # load factor up to which a structure without one cause is followed
 
 
-@dataclass(frozen=True)
-class Failure:
+@dataclass(frozen=True, eq=False)
+class Failure(Record):
     """How one drawn structure falls.
 
     - `number` under its seed; `factor` of the load at which it fell; `kind`: by what (path_of_one.py).

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Flags, Reals
+from shellform.arrays import Flags, Reals, Record
 from shellform.errors import NotConverged
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import (
@@ -34,8 +34,8 @@ from shellform.structure.solve.residual import held
 DRAWN = 8  # structures of each cause: what moves nodes farthest does so by far
 
 
-@dataclass(frozen=True)
-class Moved:
+@dataclass(frozen=True, eq=False)
+class Moved(Record):
     """Assemblies of `structures` as built, k of them, and how far each goes from a perfect structure's
     equilibrium, `motions` (6 n, k), m and rad, supports included."""
 

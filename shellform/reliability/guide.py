@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals, reals
+from shellform.arrays import Reals, Record, reals
 from shellform.errors import NotConverged
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import (
@@ -35,8 +35,8 @@ DRAWN = 24  # structures from which deviations of stretches are taken: a share o
 _LEAST = 1e-6  # m, the smallest deviation that is counted
 
 
-@dataclass(frozen=True)
-class PathStiffness:
+@dataclass(frozen=True, eq=False)
+class PathStiffness(Record):
     """The softest mode's `stiffness` (k,), N/m, at the load `factors` (k,) of the path, with cables counted
     for what they are worth; negative where the average structure has fallen."""
 

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.gridshell.gridshell import Gridshell
 from shellform.gridshell.layers import LOCK
 from shellform.structure.elements.beam import Beams
@@ -22,8 +22,8 @@ from shellform.structure.model import Model
 _STRAIGHT_ON = 0.99  # cosine of the angle between two elements of one rod
 
 
-@dataclass(frozen=True)
-class Member:
+@dataclass(frozen=True, eq=False)
+class Member(Record):
     """One rod.
 
     - `elements` (k,) among the beams, from end to end; `sense` (k,) ±1 of each along the rod.
@@ -37,8 +37,8 @@ class Member:
     locks: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
-@dataclass(frozen=True)
-class Members:
+@dataclass(frozen=True, eq=False)
+class Members(Record):
     """What errors are drawn for.
 
     - `rods`; `connectors` (j,) among the beams; `cables`: how many candidates there are.

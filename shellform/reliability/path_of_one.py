@@ -54,7 +54,7 @@ class Snap:
     far: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DrawnOutcome:
     """What became of one drawn structure.
 
@@ -77,7 +77,7 @@ class DrawnOutcome:
     resting: State | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Limit:
     """Where a stable branch ends: the load `factor` up to which it was followed, the `kind` of what ended it
     (LIMIT_POINT, BIFURCATION, BORNE where nothing did, UNLOADED where there is no equilibrium even without

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Flags, Reals, flags
+from shellform.arrays import Flags, Reals, Record, flags
 from shellform.errors import InputError, require_known
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.reliability.branch import Branch
@@ -28,8 +28,8 @@ NOMINAL_STEP = 0.125  # of the load, from one kept state of the perfect structur
 TO_ITS_END = 0.5  # the same where only the last one is asked for
 
 
-@dataclass(frozen=True)
-class Perfect:
+@dataclass(frozen=True, eq=False)
+class Perfect(Record):
     """The perfect structure under one load, and its path.
 
     - `network`; `members`; `present` (c,): which of the candidate cables it has; dead `load` (n, 6).

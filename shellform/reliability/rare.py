@@ -33,7 +33,7 @@ _STEP = 0.25  # of the load, on a structure's path at first
 _MEDIAN = 0.4549  # of a squared standard normal variable
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RareFailure:
     """`found` by subset simulation; `shares` of each cause in the squared distance of the likeliest failure
     from the perfect structure, less what as many variables have there by chance (empty where nothing failed).

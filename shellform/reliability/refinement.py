@@ -146,7 +146,7 @@ def _limit(model: Model, sought: float, resolution: float) -> tuple[Workshop, Li
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _OnMesh:
     """What one mesh says: as in `MeshError`, and where the path ends."""
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import require_count
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
@@ -38,8 +38,8 @@ _TOLD = 0.01  # of the scatter, from which on a cause is told in a sentence
 _AT_ONCE = 8  # whose motions by all causes are kept at the same time
 
 
-@dataclass(frozen=True)
-class Spread:
+@dataclass(frozen=True, eq=False)
+class Spread(Record):
     """How the misfit scatters, to first order in the errors: `nominal`, m², without errors; its `mean` and
     standard `deviation`; `causes`: each one's share of the scatter of the shape, mean |X_j|², and of that
     part of the misfit's variance that comes of where the perfect structure is off; `node_deviation` (n,), m:
@@ -67,8 +67,8 @@ class Spread:
         return result
 
 
-@dataclass(frozen=True)
-class MisfitSample:
+@dataclass(frozen=True, eq=False)
+class MisfitSample(Record):
     """Misfits, m², of drawn structures at rest under the load, and how many are `lost`: they fall, and have
     none.
     """

@@ -98,7 +98,7 @@ class UnderLoad:
         return len(self.fallen) <= allowed(self.required, self.standing.drawn)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Judgement:
     """What was found of a design: by load case, and the `critical` end of the perfect structure's path under
     the design load on the halved mesh, followed up to `sought` (None: no factor is asked for); `failed` says

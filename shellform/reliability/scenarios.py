@@ -37,7 +37,7 @@ _BEFORE = 0.9  # of the factor that a scenario bears, where it is remembered …
 _BEFORE_RESOLUTION = 1 / 16  # … or this much of the load before
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scenario:
     """A drawn structure: its `number` under a seed, its `errors`, the factor of the load that it is to bear
     at `least`, and where it is remembered, a factor that it bears with its state, `near`."""
@@ -48,7 +48,7 @@ class Scenario:
     near: tuple[float, State] | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FactorsAsBuilt(Term):
     """The factors of the load `case` up to which the `scenarios`, whose shapes have these `imperfections`,
     keep the stiffness `left`, N/m, over those that they are to bear: one value a scenario, none followed

@@ -52,7 +52,7 @@ from shellform.structure.solve.loading import SMALLEST
 Found = TypeVar("Found")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DrawnSample:
     """The `outcomes` of drawn structures, number after number, and what they say of the probability of
     standing.

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import InputError
 
 LimitState = Callable[[Reals], Sequence[float] | Reals]
@@ -35,8 +35,8 @@ _FIRST_STEP = 0.6  # standard deviation of a chain's step at first
 _ADAPTED = 5  # times a level at which the step is adapted
 
 
-@dataclass(frozen=True)
-class Rare:
+@dataclass(frozen=True, eq=False)
+class Rare(Record):
     """What subset simulation found.
 
     - `probability` of failure, with its coefficient of `variation`.

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances, enlarged
@@ -47,8 +47,8 @@ _SPARE = 1  # of the structures that may fall, none of a fresh sample: what thin
 _SAME = 1e-9  # relative
 
 
-@dataclass(frozen=True)
-class Required:
+@dataclass(frozen=True, eq=False)
+class Required(Record):
     """What a search asks of designs: the `safety`, the dead `loads` (n, 6) under which structures are drawn,
     the `design_load` among them, how many of the structures tried may have `fallen` under each, and the
     number of the `first` of them."""
@@ -69,7 +69,7 @@ class Required:
         return enlarged(self.safety.tolerances, self.safety.enlarged if number < FRESH else 1.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Demand:
     """What a search asks of structures as built.
 

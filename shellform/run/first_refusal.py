@@ -37,7 +37,7 @@ Refusal = InputError | NotConverged
 Say = Callable[[str], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WayOut:
     """With what `new` goes on where it refuses a surface: the `design` that stands, not finished yet, and the
     `wish` of which it is, on the surface in a `file` in metres (None: as given); `told` is the sentence that
@@ -49,7 +49,7 @@ class WayOut:
     file: Path | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Refused:
     """Why a shell has no design (`error`), and the first way out that leads to one, if any does."""
 

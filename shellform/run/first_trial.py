@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.case.build_problem import edge_utilisation
 from shellform.errors import NotConverged
 from shellform.gridshell.edge_beams import EdgeBeam, weight
@@ -98,8 +98,8 @@ class FirstParts:
         return None if rope is None else replace(self, rope=rope)
 
 
-@dataclass(frozen=True)
-class Followed:
+@dataclass(frozen=True, eq=False)
+class Followed(Record):
     """What a design came to: the `factor` of its load up to which it stands; under the additional load the
     stress over the strength of its rods (`stress`), where that is (`most_stressed` (3,), m), and of its edge
     beams (`edge`), how far these are off at most (`sag`, m), how far the whole shell is (`off`, m), and the
@@ -130,7 +130,7 @@ def millimetres(length: float) -> str:
     return f"{float(f'{1e3 * length:.2g}'):g} mm"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FirstDesign:
     """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; the `parts`; `thickness`, m, of
     the concrete; what the perfect structure came to (`tried`); of `drawn` structures `standing`; the largest

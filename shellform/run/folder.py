@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import shellform
-from shellform.arrays import Reals, read_arrays
+from shellform.arrays import Reals, Record, read_arrays
 from shellform.case.build_gridshell import gridshell, rounding_catalogue
 from shellform.case.case import Case, load_case
 from shellform.errors import InputError
@@ -53,8 +53,8 @@ class NoRunFolder(InputError):
     """A folder that shellform design didn't make, or in which it was stopped before its first stage."""
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, eq=False)
+class Run(Record):
     """A run read back: its `designs` by name, their `states` by design and load case, the `loads` (n, 6) by
     name, and the `summary`.
     """

@@ -22,7 +22,7 @@ _SHARP = 2.0  # spacings: a radius to which hardly a net is bent
 _BETTER = 1.4  # times the radius, for which the feet are cut off
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plinths:
     """The `surface` higher than plinths that reach up to the level `above`, m, their `height`, m, and to what
     `radius`, m, the surface was bent lower down."""

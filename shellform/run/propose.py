@@ -98,7 +98,7 @@ def propose_case(
     return _written(asked, file, ready, design, wish, ready.told)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Ready:
     """A `surface` to design for, the `options` of [surface] that lead to it, and what was `told` of it, with
     what was of its `plinths`, if it has any."""

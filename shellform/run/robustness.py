@@ -18,7 +18,7 @@ from shellform.structure.elements.state import State
 from shellform.tables import Table
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Robustness:
     """The predicted `spread`, and the `sample` that checks it (None: not asked for); `nodes` of the shell."""
 

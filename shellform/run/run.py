@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import shellform
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.case.build_gridshell import gridshell, rod_limits
 from shellform.case.build_net import net_of, net_record, size_text, surface_of, surface_record, with_rods
 from shellform.case.case import Case, check_script, dump_case
@@ -55,8 +55,8 @@ from shellform.written import make_folder, write_text
 _T = TypeVar("_T")
 
 
-@dataclass(frozen=True)
-class Parts:
+@dataclass(frozen=True, eq=False)
+class Parts(Record):
     """What the stages hand on; None until its stage is done."""
 
     surface: Surface | None = None
@@ -66,7 +66,7 @@ class Parts:
     maps: DrawnMaps | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Ended:
     """What a stage gives back: the parts, the summary, and whether its result is `complete`: pictures without
     OpenGL aren't, so that the next run makes them."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import shellform
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.compiled import clock_without_compiling
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
@@ -25,8 +25,8 @@ _AT_ONCE = 10  # structures, before they are kept
 _SHAPES = 20  # structures of which the shape is looked at: each takes some factorisations more
 
 
-@dataclass(frozen=True)
-class Examined:
+@dataclass(frozen=True, eq=False)
+class Examined(Record):
     """A design under examination: its `name`, the `shell` whose `design` it is, the dead `loads` (n, 6) by
     name, and the `tolerances` with which it is built."""
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.case.build_gridshell import gridshell
 from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
@@ -19,8 +19,8 @@ from shellform.site.scans import Scan, read_points
 from shellform.written import make_folder
 
 
-@dataclass(frozen=True)
-class Scanned:
+@dataclass(frozen=True, eq=False)
+class Scanned(Record):
     """The grid that was scanned: its `shell` and `design`, the `loads` (n, 6), N, that it may bear, the
     `origin` (3,), m, in a survey's coordinates from which its own count (None: the survey's), and the
     `folder` where results go."""

@@ -140,7 +140,7 @@ class DesignWish:
         wished(self.rod)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Placed:
     """A net with the `angle`, degrees, and `offset`, spacings, at which it lies."""
 

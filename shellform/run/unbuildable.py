@@ -14,7 +14,7 @@ from enum import Enum
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.layers import layers_of
@@ -98,8 +98,8 @@ class Why(Enum):
     SCATTER = "it isn't stable enough as built"
 
 
-@dataclass(frozen=True)
-class Obstacle:
+@dataclass(frozen=True, eq=False)
+class Obstacle(Record):
     """How an attempt failed: `why`, at which `spacing` and `thickness`, m, up to which `factor` of its load
     it stood, with which `choice` of rods on which net (`placed`), `where` (3,), m, the rods' `stress` over
     their strength, or the net's own `error`."""

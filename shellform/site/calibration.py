@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from shellform.arrays import Indices, Reals, indices, reals
+from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.errors import InputError, NotConverged, require_known
 from shellform.gridshell.gridshell import Design, Gridshell, Joint
 from shellform.net.grid import CONNECTOR
@@ -50,8 +50,8 @@ _WORSE = 1e3  # times the start's residuals: what a trial off the branch counts
 _SETTLED = 1e-5  # relative change of the residual norm or of the logarithms at which a fit ends
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, eq=False)
+class Calibration(Record):
     """The calibrated `joint`; which parameters were `fitted` and which `held` at the start.
     `identifiability`: what the data tell, with the noise or the residuals, whichever are larger. `nodes`
     (m,): the markers'; `matches` of the scans (s). `before`, `after` (m, s), m: distances of markers from the

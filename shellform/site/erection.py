@@ -55,7 +55,7 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ErectionStep:
     """One state on the way: the `stage` it belongs to and the `share` of it that is done; `height`, m, of the
     highest node over the lowest support; the largest rod `stress`, Pa, and the `element` that bears it; the
@@ -71,7 +71,7 @@ class ErectionStep:
     state: State
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Erection:
     """All `steps` in the order of building; `strength`, Pa, of the rods (inf: not known)."""
 

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.structure.elements.state import State
 
 TELLABLE = 0.5  # relative deviation of a parameter beyond which the data don't tell it
 _APART = 0.95  # correlation of two parameters from which they can't be told apart
 
 
-@dataclass(frozen=True)
-class Identifiability:
+@dataclass(frozen=True, eq=False)
+class Identifiability(Record):
     """What data of a given noise tell about parameters.
 
     - `names` (p,).

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals, indices, reals
+from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.errors import InputError, NotConverged, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.site.turns import Crew as Crew  # what an adjustment is asked with
@@ -41,8 +41,8 @@ _HALVINGS = 5  # of a change that leaves the stable branch, or leads to no likel
 _TRIAL = 25  # factorisations of an equilibrium next to a known one
 
 
-@dataclass(frozen=True)
-class Belief:
+@dataclass(frozen=True, eq=False)
+class Belief(Record):
     """What is thought of the grid as built: `design` with the estimated rest lengths, their `covariance` (p,
     p), m², of the present cables, and the `state` in equilibrium under the dead `load` (n, 6)."""
 
@@ -52,8 +52,8 @@ class Belief:
     load: Reals
 
 
-@dataclass(frozen=True)
-class Adjustment:
+@dataclass(frozen=True, eq=False)
+class Adjustment(Record):
     """The next round of turning.
 
     - `turns` (c,) of every candidate cable, in steps; `change` (c,), m, of rest length, negative where
@@ -90,8 +90,8 @@ class Adjustment:
         return table_text(Table("turns", heads, tuple(rows)))
 
 
-@dataclass(frozen=True)
-class Replay:
+@dataclass(frozen=True, eq=False)
+class Replay(Record):
     """A loop of survey and adjustment played on a grid whose true lengths are known: the true sum of squares
     of distances to the goal `misfits` (r + 1,), m², before and after every round, the `adjustments` (r,), the
     `cables` touched in each, and the true `state` in the end."""
@@ -168,8 +168,8 @@ def learn(shell: Gridshell, belief: Belief, nodes: Indices, survey: Reals, *, no
     return Belief(now, 0.5 * (covariance + covariance.T), state, belief.load)
 
 
-@dataclass(frozen=True)
-class _Likelihood:
+@dataclass(frozen=True, eq=False)
+class _Likelihood(Record):
     """How unlikely lengths are, after a survey that put the `marked` nodes at the `goal` (3 m,) with
     `noise`."""
 

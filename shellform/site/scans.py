@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from shellform.arrays import Indices, Reals, indices, reals
+from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.errors import InputError
 from shellform.site import measurements
 from shellform.site.measurements import cells_of, text_of, too_many_cells
@@ -34,8 +34,8 @@ _PAIRS = 4  # three points and one to check them
 _THIN = 0.02  # second principal size over the first, below which points lie on a line
 
 
-@dataclass(frozen=True)
-class Scan:
+@dataclass(frozen=True, eq=False)
+class Scan(Record):
     """What was measured in one load state: `points` (k, 3), m, in any order; the dead `load` (n, 6), N, at
     the time; and the `frame` in which the scanner measured: scans of one number share their axes, None means
     the model's own."""
@@ -49,8 +49,8 @@ class Scan:
         object.__setattr__(self, "load", reals("scan.load", self.load, (None, 6)))
 
 
-@dataclass(frozen=True)
-class Motion:
+@dataclass(frozen=True, eq=False)
+class Motion(Record):
     """A rigid motion x -> `turn` (3, 3) x + `shift` (3,), m."""
 
     turn: Reals
@@ -61,8 +61,8 @@ class Motion:
         return np.asarray(points @ self.turn.T + self.shift)
 
 
-@dataclass(frozen=True)
-class Match:
+@dataclass(frozen=True, eq=False)
+class Match(Record):
     """Which point is which marker: `point` (m,) the number of each marker's point, -1 where it is missing;
     `outliers` the points that belong to no marker; the `motion` that lays the points onto the model;
     `distance` (m,), m, that remains, NaN where missing; and in `doubts` what may be wrong, a sentence

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError, how_many
 from shellform.gridshell.gridshell import Gridshell
 from shellform.site import measurements
@@ -30,8 +30,8 @@ _UNLIKELY = 4.0  # times its usual error: by chance one cable in 16,000 is that 
 _TOGETHER = 0.5  # of what is left: where a rigid motion leaves less, the axes are off, not the grid
 
 
-@dataclass(frozen=True)
-class Surveyed:
+@dataclass(frozen=True, eq=False)
+class Surveyed(Record):
     """The `nodes` (k,) that were seen, their `places` (k, 3), m, in the model's axes, what each is called,
     and what is doubtful, a sentence each. `laid`: the points were laid onto the model by a rigid motion;
     `counted`: how their coordinates were made to count as the model's, in words."""

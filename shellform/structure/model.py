@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from shellform.arrays import Flags, Reals, reals
+from shellform.arrays import Flags, Reals, Record, reals
 from shellform.errors import InputError, unreadable
 from shellform.structure.elements.beam import Beams, make_beams
 from shellform.structure.elements.cable import Cables, make_cables
@@ -86,8 +86,8 @@ _PARTS = {
 }
 
 
-@dataclass(frozen=True)
-class Model:
+@dataclass(frozen=True, eq=False)
+class Model(Record):
     """`network`; `loads` by name, (n, 6) N and N·m; `start` state or None; `supported` (s,) nodes in the
     file's order.
     """

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from shellform.arrays import Flags, Indices, Reals, flags, reals
+from shellform.arrays import Flags, Indices, Reals, Record, flags, reals
 from shellform.errors import InputError, how_many
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
@@ -20,8 +20,8 @@ _STRAIGHT = 1e-9  # off the axis, over the rod's length
 _LOOSE = 1e-12  # of the firmest, an eigenvalue of what holds a part, below which it doesn't
 
 
-@dataclass(frozen=True)
-class Network:
+@dataclass(frozen=True, eq=False)
+class Network(Record):
     """`nodes` (n, 3), m, of the stress-free state; `beams`; `cables`; supports.
 
     `fixed` (n, 6): which translations and rotations along and about the global axes are held; `imposed` (n,

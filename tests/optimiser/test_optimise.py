@@ -315,8 +315,9 @@ def test_a_fresh_sample_judges_what_is_polished_with_structures_in_mind_or_where
     asked = Demand("trial", "fresh", trusted)
     best = optimum_of(asked=asked)
     polished_once(polishing, best)
-    assert polishing.asked[0][-1] == (Demand("trial", None, True) if trusted else asked)
-    assert polishing.ran[0][0].asked == polishing.asked[0][-1]
+    found = polishing.asked[0][-1]
+    assert (found.trial, found.confirmed, found.trusted) == ("trial", None if trusted else "fresh", trusted)
+    assert polishing.ran[0][0].asked is found
     polishing.mind = "some"
     polished_once(polishing, best)
     search, it = polishing.ran[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.optimiser.optimum import Step
 from shellform.output.page.embed import Picture
@@ -16,8 +16,8 @@ from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
 
 
-@dataclass(frozen=True)
-class ShownRun:
+@dataclass(frozen=True, eq=False)
+class ShownRun(Record):
     """One run on the page.
 
     What was found:

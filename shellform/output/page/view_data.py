@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.net import Net
 from shellform.output.pictures.panel import marked_nodes, scale_end
@@ -27,8 +27,8 @@ from shellform.surface.shape.target import Surface
 _MOST_TRIANGLES = 30_000  # of the surface in the view; more are merged
 
 
-@dataclass(frozen=True)
-class ViewedShell:
+@dataclass(frozen=True, eq=False)
+class ViewedShell(Record):
     """What is seen: `designs`, each with its `shells` (rods may differ) and its `states` by load case, of
     which `best` is to be built; `loads` (n, 6), N, with their `load_titles`; the `surface`, if it is known;
     `limit`, m, which ends the case's colour scale; the load that is `shown_first`."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import how_many
 from shellform.output.pictures.colours import VIRIDIS
 from shellform.output.pictures.panel import Panel, Scale
@@ -54,8 +54,8 @@ class Word:
     justify: str = "left"
 
 
-@dataclass(frozen=True)
-class Ramp:
+@dataclass(frozen=True, eq=False)
+class Ramp(Record):
     """A strip of `colours` (k, 3) between the pixels `left` and `right`, `low` and `high` from the lower left
     corner.
     """

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import InputError, require_known
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import ROD
@@ -28,8 +28,8 @@ DEGREE = float(np.pi / 180.0)
 AMPLITUDE = 0.05  # of the size of a shell or model, at which a mode is drawn
 
 
-@dataclass(frozen=True)
-class Map:
+@dataclass(frozen=True, eq=False)
+class Map(Record):
     """Values (n,) at the nodes of what `quantity` says, in a `unit` of a name and so much in SI, drawn at
     `positions` (n, 3), m.
     """

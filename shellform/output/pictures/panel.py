@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shellform.arrays import Indices, Reals, indices, reals
+from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.errors import InputError, require_known, require_number
 
 LIMIT = 0.010  # m, end of the colour scale in figures 12 to 14
@@ -42,8 +42,8 @@ def scale_end(largest: float) -> float:
     return next(end for end in ends if largest <= end * (1.0 + 1e-9))
 
 
-@dataclass(frozen=True)
-class Panel:
+@dataclass(frozen=True, eq=False)
+class Panel(Record):
     """One picture: a gridshell in one state.
 
     `positions` (n, 3), m; rod elements `beams` (m, 2); `deviation` (n,), m, of each node from its target;
@@ -91,8 +91,8 @@ class Panel:
         put("rod_radius", float(reals("rod_radius", self.rod_radius, (), positive=True)))
 
 
-@dataclass(frozen=True)
-class Skin:
+@dataclass(frozen=True, eq=False)
+class Skin(Record):
     """A surface that is shown translucent: `vertices` (v, 3), m, and `triangles` (t, 3)."""
 
     vertices: Reals
@@ -106,7 +106,7 @@ class Skin:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Look:
     """How panels are looked at.
 

@@ -14,7 +14,7 @@ from shellform.output.pictures.panel import Look, Panel, Scale, scale_of
 from shellform.output.pictures.view import Camera, fitted
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drawing:
     """A rectangle of a page: `size` in pixels, `corner` its upper left one's place from the page's; what it
     shows.
@@ -27,7 +27,7 @@ class Drawing:
     panel: Panel | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Canvas:
     """`drawings` on a canvas of a `size` in pixels, all with one `scale`, `camera` and `look`."""
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.output.pictures.panel import Look, Panel, Scale, arrow_length
 
 # Directions from the shell to the eye, and which way is up.
@@ -29,8 +29,8 @@ _MARGIN = 0.04  # of the panel, around everything
 _TITLE = 3.6  # letters' heights
 
 
-@dataclass(frozen=True)
-class Camera:
+@dataclass(frozen=True, eq=False)
+class Camera(Record):
     """`focus`, m, in the middle of the panel; unit vectors `away` to the eye, `up` and `right`; `height` and
     `width` of what is seen and `depth` from the focus to the farthest point, m."""
 

@@ -33,7 +33,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError, how_many
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
@@ -63,8 +63,8 @@ class TitleBlock:
     author: str = ""
 
 
-@dataclass(frozen=True)
-class Built:
+@dataclass(frozen=True, eq=False)
+class Built(Record):
     """A `design` to build of a `shell`, with its `states` by load case, "none" among them; for the heads its
     `name` and the job's `title`; `block`: what the title block says of who drew it and when. `hung`: the
     state in which cables are hung in, the erected grid before bracing (None: the target). `adjustment`, m:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import NotConverged
 from shellform.structure.answers.halved import Refined, critical_error
 from shellform.structure.answers.increments import LoadIncrement, PathIncrement, Reached, Waypoint
@@ -50,8 +50,8 @@ PathWatch = Callable[[float, int], None]
 """Called with the load factor and the factorisations so far."""
 
 
-@dataclass(frozen=True)
-class Analysis:
+@dataclass(frozen=True, eq=False)
+class Analysis(Record):
     """The last state reached and why it ended there.
 
     `load` (n, 6) at that state; `reactions` (n, 6), what held degrees of freedom bear there, N and N·m;
@@ -154,7 +154,7 @@ def analyse(
     )
 
 
-@dataclass
+@dataclass(eq=False)
 class _Analysis:
     """An analysis under way."""
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,8 @@ class Waypoint:
         return {"factor": self.factor, "iterations": self.factorisations, "stable": self.stable}
 
 
-@dataclass(frozen=True)
-class Reached:
+@dataclass(frozen=True, eq=False)
+class Reached(Record):
     """An equilibrium at which load `factor`, found by how many `factorisations`; how far each loaded node has
     moved, `displacements` (3,), m, by its number; whether it is `stable`, and how many pivots are
     `negative`."""
@@ -47,7 +47,7 @@ class Reached:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LoadIncrement:
     """An increment of the load: what was `reached`, and the `waypoints` before it, if there were any."""
 
@@ -59,7 +59,7 @@ class LoadIncrement:
         return {**self.reached.document(), "steps": [each.document() for each in self.waypoints]}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PathIncrement:
     """From one point of a path to the next: what was `reached`; the `rate`, 1/m, at which the factor goes
     with the path's length there; and the `event` there: "", "limit point" or "bifurcation"."""

@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.parts import Part
@@ -43,8 +43,8 @@ _AT_ONCE = 2**26  # numbers of a block that is solved for at once: 512 MB
 _FEW = 3
 
 
-@dataclass(frozen=True)
-class Response:
+@dataclass(frozen=True, eq=False)
+class Response(Record):
     """An equilibrium ready for sensitivities: `factor` of the tangent at `state`, and `force_by_design` (f,
     s), the derivative of the unbalanced internal forces on the free degrees of freedom by the design
     variables; `family` and `tangent` (nnz,) are what was factorised."""

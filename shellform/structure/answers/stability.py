@@ -29,7 +29,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigsh
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import InputError, NotConverged, require_count
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
@@ -48,8 +48,8 @@ _SHIFTS = 60  # … as often, that is by 36 digits
 _DENSE = 12  # degrees of freedom up to which Lanczos vectors don't fit
 
 
-@dataclass(frozen=True)
-class Modes:
+@dataclass(frozen=True, eq=False)
+class Modes(Record):
     """The softest modes of an equilibrium: `stiffness` (k,), N/m, the smallest first, negative where
     unstable; `shapes` (k, n, 6), the largest translation of each is 1."""
 
@@ -57,8 +57,8 @@ class Modes:
     shapes: Reals
 
 
-@dataclass(frozen=True)
-class Critical:
+@dataclass(frozen=True, eq=False)
+class Critical(Record):
     """Where stability ends: load `factor`, the `kind` of point ("limit point" or "bifurcation"), its
     `equilibrium` and `mode` (n, 6).
 

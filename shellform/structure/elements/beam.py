@@ -41,7 +41,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shellform.arrays import Flags, Indices, Reals, indices, reals
+from shellform.arrays import Flags, Indices, Reals, Record, indices, reals
 from shellform.errors import InputError
 from shellform.structure.elements.beam_foreseen import foreseen
 from shellform.structure.elements.beam_kernels import evaluate, local_by_dof
@@ -58,8 +58,8 @@ _NO_MODES = np.empty((0, 6, 9, 2))
 _PARALLEL_TO_Z = 1e-6  # rad; nearer to global z than this, the default z axis is global x (model file)
 
 
-@dataclass(frozen=True)
-class Beams:
+@dataclass(frozen=True, eq=False)
+class Beams(Record):
     """Beams of a network of `nodes` nodes.
 
     `ends` (m, 2) node numbers; `axial` EA, N; `torsion` GJ, `bending_y` EI_y, `bending_z` EI_z, N·m²;

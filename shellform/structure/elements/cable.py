@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shellform.arrays import Indices, Reals, indices, reals
+from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.structure.elements.double_double import cable_evaluation
@@ -28,8 +28,8 @@ _NOTHING = np.empty((0, 21))
 _NO_LENGTH = 1e-300  # a cable whose ends meet is slack and pulls nowhere
 
 
-@dataclass(frozen=True)
-class Cables:
+@dataclass(frozen=True, eq=False)
+class Cables(Record):
     """`ends` (c, 2) node numbers, `rest_length` (c,) m, `stiffness` EA (c,) N."""
 
     ends: Indices

@@ -17,7 +17,7 @@ from shellform.structure.elements.state import State
 _ROW, _COLUMN = np.tril_indices(6)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EasedCables:
     """The `cables` without stiffness along them; a part of a model, with their energy and forces."""
 

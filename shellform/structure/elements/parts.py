@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.structure.elements.state import State
 
 
-@dataclass(frozen=True)
-class Evaluation:
+@dataclass(frozen=True, eq=False)
+class Evaluation(Record):
     """Elements of one part at one state: `energy` (m,) J, `force` (m, k) its gradient, `tangent` (m, k (k +
     1) / 2).
 

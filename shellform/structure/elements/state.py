@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shellform.arrays import Reals, reals
+from shellform.arrays import Reals, Record, reals
 from shellform.structure.elements import rotation
 from shellform.structure.elements.double_double import moved_on, quaternions_of
 
 
-@dataclass(frozen=True)
-class State:
+@dataclass(frozen=True, eq=False)
+class State(Record):
     """Positions (n, 3), m, and total rotations from the stress-free state, unit quaternions (n, 4).
 
     `tail` (n, 7): what positions and quaternions have beyond double precision where stiffnesses lie so far

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.compiled import njit
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
@@ -27,8 +27,8 @@ from shellform.structure.solve.factorisation import Factor, Symmetric
 from shellform.work_clock import Work, counts_as
 
 
-@dataclass(frozen=True)
-class Balance:
+@dataclass(frozen=True, eq=False)
+class Balance(Record):
     """All elements at one state: strain `energy` J, nodal internal `force` (n, 6), lower `tangent` values (or
     None).
 

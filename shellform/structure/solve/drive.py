@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.errors import NotConverged
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
@@ -20,8 +20,8 @@ _LEAST = 1e-6  # of the whole, by which supports move on at least where the bran
 _LAST_DIGITS = 1e-15  # of a load, which nothing can be told from
 
 
-@dataclass(frozen=True)
-class Drive:
+@dataclass(frozen=True, eq=False)
+class Drive(Record):
     """What grows with the load factor: dead `load` (n, 6), N and N·m, and the motion `imposed` (n, 6) of held
     degrees of freedom, m and rad (turns about fixed axes); `base` (n, 6) is there all the time."""
 

@@ -62,7 +62,7 @@ _SYMMETRIC_UP_TO = 20_000  # degrees of freedom
 _HALVINGS = 4  # of one step before the mass is raised instead
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Equilibrium:
     """A state in which the forces balance.
 

@@ -22,7 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.structure.solve import pardiso
@@ -308,8 +308,8 @@ def _by_cholmod(factor: Any, right: Reals) -> Reals:
     return result[:, 0] if right.ndim == 1 else result
 
 
-@dataclass(frozen=True)
-class _Thin:
+@dataclass(frozen=True, eq=False)
+class _Thin(Record):
     """P A P' = L D L': `order` of the rows, L by columns with D on its diagonal, which comes first."""
 
     order: Indices

@@ -43,7 +43,7 @@ Reached = Callable[[float, Equilibrium], None]
 """Called with each share of the way that is reached, and the equilibrium there."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Loaded:
     """The equilibrium under the whole load; `share` of the load change up to which the stable branch was
     followed (1: to the end); `factorisations` of all increments."""
@@ -125,7 +125,7 @@ def advance(
     return way.ended(assembly, drive, begin, end, tolerance, stay=stay, limit=limit, report=report)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BranchPart:
     """How far increments have followed the stable branch: up to a `share` of the load change, to the `state`
     that was `found` there, None at the start; `factorisations` spent."""

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.factorisation import Factor
@@ -37,8 +37,8 @@ KINK = 1 / 64  # of the load, a step so short may turn or bend by a cable's kink
 WINDOW = 1 / 512  # of the load, a step so short may pass over bifurcations that lie within it
 
 
-@dataclass(frozen=True)
-class View:
+@dataclass(frozen=True, eq=False)
+class View(Record):
     """A stable `state`: its tangent's lower `values`, as the assembly has them; `onward` (n, 6), m and rad,
     the motion with what measures the step; the `soft` shapes (f, k) with unit mass and their `stiffness`
     (k,), N/m."""

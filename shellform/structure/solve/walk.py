@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError, NotConverged
 from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State, moved
@@ -34,7 +34,7 @@ Lead = tuple[int, int, float]
 """A degree of freedom that leads: the node, the axis 0 to 2, its displacement, m."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PathPoint:
     """A converged point of the path: load `factor`; `equilibrium`; `rate`, the change of the factor with the
     path's length (1/m, negative where the load falls); `event`: "", "limit point" or "bifurcation"."""
@@ -45,8 +45,8 @@ class PathPoint:
     event: str = ""
 
 
-@dataclass(frozen=True)
-class OnPath:
+@dataclass(frozen=True, eq=False)
+class OnPath(Record):
     """A point with what the next step needs: `tangent` (f,), the change of the free degrees of freedom with
     the factor; the lower `values` of K.
     """

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many, require_number
 
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
@@ -22,8 +22,8 @@ _TRIANGLES = 2.5  # in a square of the mesh size, with what a surface's rise add
 _ENTRIES = ("surface.layer", "surface.object")
 
 
-@dataclass(frozen=True)
-class Draft:
+@dataclass(frozen=True, eq=False)
+class Draft(Record):
     """`points` (v, 3) in units of `metres` m (None: the file doesn't say) with the vertical axis `up`;
     `triangles` (t, 3); unit `normals` (v, 3) where the source knows them, zero where it knows others;
     `notes`, a sentence for each thing left out or chosen."""
@@ -36,8 +36,8 @@ class Draft:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class MeshObject:
+@dataclass(frozen=True, eq=False)
+class MeshObject(Record):
     """One object of a file: `points` (v, 3) and its `faces`, arrays (f, k) of polygons with k corners
     each.
     """

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.mend import noted
@@ -97,8 +97,8 @@ def _upwards(draft: Draft) -> Draft:
     return draft if up >= 0.0 else replace(draft, triangles=draft.triangles[:, ::-1].copy())
 
 
-@dataclass(frozen=True)
-class _Arch:
+@dataclass(frozen=True, eq=False)
+class _Arch(Record):
     """A stretch of the outer edge that doesn't stand on the ground: its `vertices` from foot to foot, and the
     ground's vertices `before` and `after` it, which are the feet themselves where the ground is but a point
     there."""

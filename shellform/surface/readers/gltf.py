@@ -20,7 +20,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError
 from shellform.surface.readers.draft import (
     MOST_BYTES,
@@ -97,8 +97,8 @@ def _opened(file: Path) -> tuple[dict[str, Any], bytes]:
     return tree, inside
 
 
-@dataclass(frozen=True)
-class Solid:
+@dataclass(frozen=True, eq=False)
+class Solid(Record):
     """What is written: triangles under a `name`, `points` (n, 3), m, z upwards, with `normals` (n, 3), in a
     `colour` (r, g, b, opacity), 0 to 1.
     """
@@ -168,8 +168,8 @@ def write_glb(path: Path, solids: Sequence[Solid]) -> None:
     path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
 
 
-@dataclass(frozen=True)
-class _Placed:
+@dataclass(frozen=True, eq=False)
+class _Placed(Record):
     """A mesh's `primitive`, not yet loaded, at its `place` (4, 4) in the scene."""
 
     name: str

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, Record
 
 
-@dataclass(frozen=True)
-class Curve:
+@dataclass(frozen=True, eq=False)
+class Curve(Record):
     """A NURBS curve: `control` (n, 3), m, `weights` (n,), `knots` (n + degree + 1,)."""
 
     control: Reals
@@ -17,8 +17,8 @@ class Curve:
     degree: int
 
 
-@dataclass(frozen=True)
-class Patch:
+@dataclass(frozen=True, eq=False)
+class Patch(Record):
     """A NURBS surface: `control` (m, n, 3), m, `weights` (m, n), `knots` along u and v, `degree` along u and
     v; it is trimmed by `loops` of curves, the outer one first, or whole where there are none.
     """

@@ -22,7 +22,7 @@ import numpy as np
 import rhino3dm
 from scipy.interpolate import make_interp_spline
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError
 from shellform.surface.readers.draft import Choice, Draft, MeshObject, among, joined
 from shellform.surface.readers.nurbs import Curve, Patch
@@ -40,8 +40,8 @@ _ON_EDGE = 1e-4  # of the size: a trim nearer to the patch's own edge than that 
 _SAMPLES = 161  # along each side, whose chords are then nearer to it than that
 
 
-@dataclass(frozen=True)
-class Item:
+@dataclass(frozen=True, eq=False)
+class Item(Record):
     """What is written: on `layer`, under a `name`, a NURBS curve through `points` (n, 3), m, a straight line
     where there are two, a point where there is one, or where `triangles` are given their mesh; `strings` are
     its user strings."""

@@ -39,7 +39,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, NotConverged, require_number
 from shellform.structure.solve.factorisation import Factor, Symmetric
 from shellform.surface.shape.target import Surface, make_surface, rough_normals, vertex_areas
@@ -58,8 +58,8 @@ _GROUND = 0.02  # of the rise: edges within it of the lowest stand on the ground
 _RELAXED = 1.6  # over-relaxation
 
 
-@dataclass(frozen=True)
-class Faired:
+@dataclass(frozen=True, eq=False)
+class Faired(Record):
     """A `surface` curved at most to a radius, the surface as it was, `before`, on the same triangles, and how
     far each vertex moved, `change` (v,) m."""
 

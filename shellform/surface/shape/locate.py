@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.compiled import njit, prange
 from shellform.surface.shape.extension import extended
 from shellform.surface.shape.patch import controls, edge_cubic, evaluate
@@ -29,8 +29,8 @@ _STEPS = 120  # of Newton's method and from triangle to triangle
 _DONE = 1e-13  # of a triangle: a step that counts as none
 
 
-@dataclass(frozen=True)
-class Foot:
+@dataclass(frozen=True, eq=False)
+class Foot(Record):
     """Feet of k points: `point` (k, 3), m; unit `normal` (k, 3), upwards; signed `distance` (k,), m, along
     it, its gradient the normal and its `hessian` (k, 6), 1/m, packed lower; the `triangle` (k,) on which the
     foot lies; whether it lies `past` (k,) the surface's edge."""

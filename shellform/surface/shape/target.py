@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 
-from shellform.arrays import Indices, Reals, indices, reals
+from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.compiled import njit
 from shellform.errors import InputError, how_many
 from shellform.surface.shape.jets import jets
@@ -23,8 +23,8 @@ _SAME = 1e-9  # of the size: vertices nearer than that are one
 _FLAT = 1e-12  # of the squared size: triangles smaller than that have no area
 
 
-@dataclass(frozen=True)
-class Surface:
+@dataclass(frozen=True, eq=False)
+class Surface(Record):
     """`vertices` (v, 3), m; `triangles` (t, 3), all turned the same way; unit `normals` (v, 3) to the upper
     side, on which the concrete is poured; `source`, the file or script it came from; `mended`, a sentence for
     each defect that was mended."""
