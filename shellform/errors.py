@@ -12,6 +12,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+_WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-9)  # rad
+
 
 class ShellformError(Exception):
     """Base of both, for callers who catch everything that this package says on purpose: the message is the
@@ -94,6 +96,18 @@ def require_number(
         what = f"must be {_between(above, least, below, most)}"
         hint = if_per_cents(value, min(below, most)) if share else ""
         raise InputError(what, where=where, value=value, remedy=f"Give {give}.{hint}")
+
+
+def require_angle(value: float, *, where: str, give: str) -> None:
+    """Raises InputError for what is no angle, rad, and for one of more than a whole turn, as degrees are."""
+    require_number(value, where=where, give=give)
+    if abs(value) > _WHOLE_TURN:
+        raise InputError(
+            f"{value:g} rad is more than a whole turn",
+            where=where,
+            value=value,
+            remedy=f"Leave whole turns out; if degrees are meant, give {math.radians(value):.4g} rad.",
+        )
 
 
 def if_per_cents(value: float, most: float) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals, reals
-from shellform.errors import InputError, require_count, require_known, require_number
+from shellform.errors import InputError, require_angle, require_count, require_known, require_number
 from shellform.gridshell.areas import areas, between, facets, tributary, within
 from shellform.net.net import Net
 from shellform.net.polylines import inside
@@ -47,10 +47,10 @@ class Region:
 
     def __post_init__(self) -> None:
         if self.half is not None:
-            require_number(self.half, where="load.half", give=_ANGLE)
+            require_angle(self.half, where="load.half", give=_ANGLE)
         if self.strip is not None:
             _numbers("strip", self.strip, 3, f"{_ANGLE}, and two places along it, m")
-            require_number(self.strip[0], where="load.strip[0]", give=_ANGLE)
+            require_angle(self.strip[0], where="load.strip[0]", give=_ANGLE)
         if self.ring is not None:
             _numbers("ring", self.ring, 2, "two levels, m")
         for name, limits in [("strip", self.strip and self.strip[1:]), ("ring", self.ring)]:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Reals, reals
-from shellform.errors import InputError, require_count, require_number
+from shellform.errors import InputError, require_angle, require_count, require_number
 from shellform.net.compass import Finder, covering_lattice
 from shellform.net.grid import Grid, lattice_grid
 from shellform.net.lattice_origin import origin_at, origin_of_guides
@@ -45,7 +45,6 @@ from shellform.surface.shape.locate import Locator
 from shellform.surface.shape.target import Surface
 
 MERGE = 0.2  # of the spacing
-_ROUND = 2.0 * np.pi * (1.0 + 1e-9)  # rad, a whole turn
 ELEMENTS = 4  # a segment, as in section 4.1
 # Spacings past the edge; the next is tried where the pulled grid left the surface's rim bare
 _MARGINS = (1.5, 2.5, 4.0, 6.5, 10.0)
@@ -61,6 +60,13 @@ class NetTuning:
     reach: float = REACH
     tolerance: float = TOLERANCE
     tail: int = 0
+
+    def __post_init__(self) -> None:
+        require_count(self.limit, where="tuning.limit", give=f"a number of factorisations, such as {LIMIT}")
+        require_count(self.tail, least=0, where="tuning.tail", give="a number of segments, such as 2")
+        require_number(self.reach, above=0.0, where="tuning.reach", give=f"spacings, such as {REACH:g}")
+        give = f"a share of the forces, such as {TOLERANCE:g}"
+        require_number(self.tolerance, above=0.0, below=1.0, where="tuning.tolerance", give=give)
 
 
 Method = Literal["pull", "compass"]
@@ -241,17 +247,23 @@ def _check(surface: Surface, settings: NetSettings) -> None:
     require_count(settings.elements, where="net.elements", give="beam elements a segment, such as 4")
     give = "a share of the spacing, such as 0.2"
     require_number(settings.merge, above=0.0, below=0.5, where="net.merge", give=give, share=True)
+    give = f"EI/s a radian, such as {SHEAR_STIFFNESS:g}"
+    require_number(settings.shear_stiffness, above=0.0, where="net.shear_stiffness", give=give)
+    if settings.ground is not None:
+        require_number(settings.ground, where="net.ground", give="a level in metres, or leave it out")
 
 
 def _check_place(angle: float, offset: tuple[float, float]) -> None:
     """Raises InputError for an angle, rad, and an offset, in spacings, that say no place of the net."""
-    place, what, remedy = [angle, *offset], "must be numbers", "Give degrees, and spacings."
-    if np.isfinite(place).all():
-        if abs(angle) <= _ROUND:
-            return
-        what = f"{angle:g} rad is more than a whole turn"
-        remedy = f"Leave whole turns out; if degrees are meant, give {np.deg2rad(angle):.4g} rad."
-    raise InputError(what, where="net.angle, net.offset", value=place, remedy=remedy)
+    place = [angle, *offset]
+    if not np.isfinite(place).all():
+        raise InputError(
+            "must be numbers",
+            where="net.angle, net.offset",
+            value=place,
+            remedy="Give an angle, and spacings along u and v.",
+        )
+    require_angle(angle, where="net.angle", give="an angle in radians, such as 0.785")
 
 
 def _short(bare: int, angle: float) -> NoNet:

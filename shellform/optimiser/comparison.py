@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import require_count, require_known
+from shellform.errors import require_count, require_known, require_number
 from shellform.gridshell.gridshell import Design
 from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch, not_carried
 from shellform.problem.paths import follow, without_slack
@@ -150,6 +150,7 @@ def compare(
     """
     require_known(method, METHODS, where="method", what="is no known method")
     require_count(evaluations, where="evaluations", give="a number of designs to try, such as 200")
+    require_number(tolerance, above=0.0, below=1.0, where="tolerance", give="a small share, such as 1e-8")
     plain = Plain(problem, start)
 
     def counted(function: Any) -> Any:

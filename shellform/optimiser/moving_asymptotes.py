@@ -74,7 +74,7 @@ class MovingAsymptotes:
     least_margin: float = 0.01
 
     def __post_init__(self) -> None:
-        check_settings(self)
+        check_settings(self, shares=("tolerance", "margin", "least_margin"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -153,6 +153,11 @@ class SequentialConvex:
                 value=(self.shrink, self.grow),
                 remedy="Give shrink below 1 and grow of 1 or more, such as 0.4 and 1.6.",
             )
+        for name, give in (("grow", "a factor of the window"), ("stiffer", "a factor of the stiffness")):
+            value, where = getattr(self, name), f"solver.{name}"
+            require_number(
+                value, least=1.0, below=100.0, where=where, give=f"{give}, such as 1.1", share=True
+            )
 
 
 _MAY_BE_ZERO = (
@@ -169,7 +174,20 @@ _MAY_BE_ZERO = (
     "stiffenings",
 )
 
-_SHARES = ("recovery", "kept", "allowance", "idle", "softer")
+_SHARES = (
+    "stiffness",
+    "good",
+    "poor",
+    "near",
+    "margin",
+    "least_margin",
+    "least_tension",
+    "recovery",
+    "kept",
+    "allowance",
+    "idle",
+    "softer",
+)
 
 # A polished design serves the shape alone and is near: smaller windows, and of the stiffness kept before it
 # may use up a fifth.

@@ -165,6 +165,10 @@ class LeastTension(Term):
         require_number(
             self.scale, above=0.0, where="least_tension.scale", give="newtons, such as the least asked for"
         )
+        if self.let_out != np.inf:
+            give = "a factor of the lengths in the target, such as 1.05, or leave it out"
+            where = "least_tension.let_out"
+            require_number(self.let_out, above=0.0, below=100.0, where=where, give=give, share=True)
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N, twice `scale` where there are no cables. A slack cable counts with the tension that

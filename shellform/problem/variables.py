@@ -22,6 +22,7 @@ from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 
 _SAME = 1e-9  # relative
+_THICKEST = 100.0  # times the start's radius: what is beyond can only be in another unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,9 +150,10 @@ class FreeRadius(Variable):
         """m. Raises InputError where they contradict each other."""
         least = 0.25 * start.radius if self.least is None else self.least
         most = start.radius if self.most is None else self.most
-        if not 0.0 < least <= most:
+        if not 0.0 < least <= most < _THICKEST * start.radius:
             raise InputError(
-                "the bounds must be positive, the lower below the upper one",
+                f"the bounds must be positive, the lower below the upper one, and that below {_THICKEST:g} times "
+                "the start's radius",
                 where="variables.radius",
                 value=(least, most),
                 remedy=f"Give metres, such as {0.25 * start.radius:.3g} and {start.radius:.3g}.",

@@ -68,6 +68,8 @@ class Safety:
         for name, usual in (("drawn", 60), ("tried", 12)):
             give = f"a number of structures, such as {usual}"
             require_count(getattr(self, name), where=f"safety.{name}", give=give)
+        give = "deviations of what a cable is off by, such as 0.5, or 0 for none"
+        require_number(self.margin, least=0.0, where="safety.margin", give=give)
         give = "a share of the start's stiffness, such as 0.5"
         require_number(self.stiffness, above=0.0, most=1.0, where="safety.stiffness", give=give, share=True)
         give = "a factor of the errors, such as 1.5"

@@ -22,7 +22,6 @@ from shellform.errors import (
     require_count,
     require_file,
     require_known,
-    require_number,
 )
 from shellform.gridshell.gridshell import Gridshell
 from shellform.run.folder import Run, read_run
@@ -170,9 +169,7 @@ def replay(
     Writes replay.csv. Raises InputError, NotConverged.
     """
     require_count(rounds, where="--replay", give="a number of rounds, such as 3")
-    require_number(
-        slip, least=0.0, most=1.0, where="--slip", give="a share of each turn, such as 0.05, or 0 for none"
-    )
+    retensioning.check_slip(slip)
     run = read_run(folder)
     name, shell, belief = _believed(run, options)
     nodes = (

@@ -27,11 +27,12 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from shellform.arrays import Indices, Reals, Record, indices, reals
-from shellform.errors import InputError, NotConverged, require_known
+from shellform.errors import InputError, NotConverged, require_known, require_number
 from shellform.gridshell.gridshell import Design, Gridshell, Joint
 from shellform.net.grid import CONNECTOR
 from shellform.problem.paths import follow
 from shellform.site.identifiability import Identifiability, identifiability, nuisance
+from shellform.site.measurements import check_noise
 from shellform.site.scans import Match, Scan, apart, distances, laid
 from shellform.structure.answers.sensitivity import by_stiffness, respond, state_by_design, stiffness_rate
 from shellform.structure.elements.state import State
@@ -122,6 +123,7 @@ def foresee(
     at their present values: choose load states with it before anything is measured. Raises NotConverged where
     a load isn't borne on the stable branch."""
     markers = _checked(shell, nodes)
+    check_noise(noise)
     model = _Model(shell, design, loads)
     begun = model.begin(shell.joint)
     if not all(each.on_branch for each in begun):
@@ -153,6 +155,9 @@ def calibrate(
     or where nothing can be told.
     """
     markers = _checked(shell, nodes)
+    check_noise(noise)
+    if reach is not None:
+        require_number(reach, above=0.0, where="calibrate.reach", give="metres, such as half the spacing")
     for name in free:
         require_known(name, PARAMETERS, where="calibrate.free", what="isn't a connector's stiffness")
     if not scans:

@@ -24,6 +24,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.errors import InputError, NotConverged, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.site.measurements import check_noise
 from shellform.site.turns import Crew as Crew  # what an adjustment is asked with
 from shellform.site.turns import whole_turns
 from shellform.structure.answers.sensitivity import by_rest_length, predicted, respond, state_by_design
@@ -190,6 +191,7 @@ def adjust(shell: Gridshell, belief: Belief, goal: Reals, crew: Crew, *, noise: 
     """The next turns towards the `goal` (n, 3), m, as far as the crew can; see the head. Raises
     NotConverged.
     """
+    check_noise(noise)
     wanted = reals("goal", goal, (shell.node_count, 3))
     assembly = assemble(shell.network(belief.design))
     rates = _rates(shell, assembly, belief.design, belief.state)
@@ -225,6 +227,12 @@ def adjust(shell: Gridshell, belief: Belief, goal: Reals, crew: Crew, *, noise: 
     )
 
 
+def check_slip(slip: float) -> None:
+    """Raises InputError for a crew's error of turns that is no share of them."""
+    give = "a share of each turn, such as 0.05, or 0 for none"
+    require_number(slip, least=0.0, most=1.0, where="--slip", give=give, share=True)
+
+
 def replay(
     shell: Gridshell,
     belief: Belief,
@@ -246,6 +254,7 @@ def replay(
     """
     require_count(rounds, where="rounds", give="a number of rounds, such as 3")
     require_count(seed, least=0, where="seed", give="a whole number, such as 1")
+    check_slip(slip)
     rng = np.random.default_rng(seed)
     wanted = reals("goal", goal, (shell.node_count, 3))
     wrong = reals("errors", errors, (len(belief.design.present),))

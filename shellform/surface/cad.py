@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError, NotConverged, require_file
+from shellform.errors import InputError, NotConverged, require_file, require_number
 from shellform.surface.occ import errors, extent, gmsh, mesh_faces, session, silence, surface_from, to_sew
 from shellform.surface.readers.draft import Draft, require_mesh_size
 from shellform.surface.readers.nurbs import Patch
@@ -280,12 +280,14 @@ def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) ->
     and returns how far it is off, m.
 
     Raises InputError for other endings and for surfaces with openings, which one B-spline can't have, and
-    NotConverged where the vertices are further off than `within` of the size.
+    NotConverged where the vertices are further off than `within` of the size, a share of it.
     """
     file = Path(path)
     kind = FORMATS.get(file.suffix.lower())
     if kind is None:
         raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")
+    give = "a share of the surface's size, such as 0.001"
+    require_number(within, above=0.0, below=1.0, where="within", give=give, share=True)
     loops = surface.boundary
     if len(loops) > 1:
         raise InputError(

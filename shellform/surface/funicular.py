@@ -210,16 +210,18 @@ def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least
 
     Vertices of its edge within a hundredth of its rise of the `ground`, m (left out: the lowest), are held.
     The force densities are those that leave the least unbalanced force on the surface as it is, none below
-    `least` of their mean, so that all stays in compression. Raises InputError where nothing is held, and
-    where `least` isn't above 0.
+    `least` of their mean, so that all stays in compression. Raises InputError where nothing is held, where
+    the ground isn't below the surface's top, and where `least` isn't above 0 and at most 1.
     """
     from shellform.surface.shape.target import make_surface, vertex_areas
 
     points, faces = surface.vertices, surface.triangles
+    top = float(points[:, 2].max())
     level = float(points[:, 2].min()) if ground is None else ground
+    require_number(level, below=top, where="ground", give="metres below its top, or leave it out")
     held = np.zeros(len(points), dtype=bool)
     edge = np.concatenate(surface.boundary)
-    held[edge] = points[edge, 2] < level + 0.01 * (float(points[:, 2].max()) - level)
+    held[edge] = points[edge, 2] < level + 0.01 * (top - level)
     if not held.any():
         raise InputError(
             "nothing of its edge stands on the ground",
@@ -248,9 +250,10 @@ def fitted_densities(
     They minimise the squared unbalanced forces on the free `nodes` (n, 3), m, under `loads` (n, 3), N, with
     the size of each at least `least` times that of the uniform density that fits best; of many such, those
     nearest to uniform. Arguments as in `force_density`. Raises InputError where no compression bears the
-    loads better than none, and where `least` isn't above 0.
+    loads better than none, and where `least` isn't above 0 and at most 1.
     """
-    require_number(least, above=0.0, where="least", give="a share of their mean, such as 0.05")
+    give = "a share of their mean, such as 0.05"
+    require_number(least, above=0.0, most=1.0, where="least", give=give, share=True)
     place = reals("nodes", nodes, (None, 3))
     ends = indices("edges", edges, (None, 2), below=len(place))
     load = reals("loads", loads, (len(place), 3))

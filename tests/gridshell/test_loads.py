@@ -310,6 +310,8 @@ def test_loads_that_cannot_be_are_refused_with_their_entry(flat):
     ("make", "said"),
     [
         (lambda: Region(half=np.nan), r"load\.half: must be finite"),
+        (lambda: Region(half=90.0), r"load\.half: 90 rad is more than a whole turn.*give 1\.571 rad"),
+        (lambda: Region(strip=(-45.0, 0.0, 0.1)), r"load\.strip\[0\]: -45 rad.*give -0\.7854 rad"),
         (lambda: Region(half="west"), r"load\.half: must be a number"),
         (lambda: Region(strip=(0.0, 0.1)), r"load\.strip: must be 3 numbers"),
         (lambda: Region(strip=(0.0, np.nan, 0.1)), r"load\.strip: must be 3 numbers"),

@@ -98,12 +98,23 @@ def test_a_surface_with_a_spike_is_refused(vault):
         ({"spacing": 0.055, "gap": 0.002, "merge": 0.9}, "below 0.5.*share of the spacing"),
         ({"spacing": 0.055, "gap": 0.002, "angle": float("nan")}, "must be numbers"),
         ({"spacing": 0.055, "gap": 0.002, "angle": 45.0}, "if degrees are meant, give 0.7854 rad"),
+        ({"spacing": 0.055, "gap": 0.002, "shear_stiffness": -0.1}, "net.shear_stiffness: must be positive"),
+        ({"spacing": 0.055, "gap": 0.002, "ground": float("nan")}, "net.ground: must be finite"),
         ({"spacing": 0.055, "gap": 0.002, "offset": (float("inf"), 0.0)}, "must be numbers"),
     ],
 )
 def test_settings_that_cannot_work_are_refused(vault, settings, said):
     with pytest.raises(InputError, match=said):
         sf.pull_net(vault, **settings)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"limit": 0}, {"tail": -1}, {"reach": 0.0}, {"tolerance": 1.0}, {"tolerance": float("nan")}]
+)
+def test_tuning_that_cannot_work_is_refused_by_name(wrong):
+    (name,) = wrong
+    with pytest.raises(InputError, match=rf"tuning\.{name}"):
+        sf.NetTuning(**wrong)
 
 
 def test_where_the_centroid_lies_in_the_bend_of_an_l_the_net_begins_on_the_surface():

@@ -131,6 +131,9 @@ def test_what_can_t_be_compared_is_refused(coarse):
     asked = problem(coarse, 4.0)
     with pytest.raises(InputError, match=r"trust-constr, SLSQP"):
         compare(asked, coarse.design(), method="COBYLA")
+    for tolerance in (0.0, 1.0, np.nan):
+        with pytest.raises(InputError, match="tolerance: must be"):
+            compare(asked, coarse.design(), tolerance=tolerance)
     with pytest.raises(NotConverged, match=r"'wetter'.*by stages"):
         compare(problem(coarse, 5.0), coarse.design())
     short = compare(asked, coarse.design(), method="SLSQP", evaluations=3)

@@ -6,6 +6,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.optimiser import solver
+from shellform.optimiser.moving_asymptotes import MovingAsymptotes
 from shellform.optimiser.solver import SequentialConvex
 
 MAY_BE_ZERO = {
@@ -23,6 +24,25 @@ def test_settings_are_positive_but_those_that_may_be_nothing(name):
     else:
         with pytest.raises(InputError, match=rf"solver\.{name}"):
             SequentialConvex(**{name: 0.0})
+
+
+@pytest.mark.parametrize("name", ["stiffness", "good", "poor", "near", "margin", "least_tension", "kept"])
+def test_a_share_in_per_cent_is_refused_with_the_number_to_write(name):
+    with pytest.raises(InputError, match=rf"solver\.{name}: must be .*For 97 % write 0.97\.$"):
+        SequentialConvex(**{name: 97})
+    assert getattr(SequentialConvex(**{name: 1.0}), name) == 1.0
+
+
+@pytest.mark.parametrize("name", ["grow", "stiffer"])
+def test_a_factor_in_per_cent_is_refused_with_the_number_to_write(name):
+    with pytest.raises(InputError, match=rf"solver\.{name}: must be .*For 110 % write 1.1\.$"):
+        SequentialConvex(**{name: 110})
+
+
+@pytest.mark.parametrize("name", ["tolerance", "margin", "least_margin"])
+def test_a_share_of_the_method_of_moving_asymptotes_in_per_cent_is_refused(name):
+    with pytest.raises(InputError, match=rf"solver\.{name}: must be .*For 15 % write 0.15\.$"):
+        MovingAsymptotes(**{name: 15})
 
 
 def test_windows_shrink_and_grow():

@@ -611,3 +611,11 @@ def test_supports_clash_where_they_stand_nearer_than_a_shoe_is_wide(monkeypatch)
     assert [apart for *_, apart in found] == pytest.approx([0.0013**0.5, 0.05])
     shell.net.supports = np.array([], dtype=int)
     assert schedules.clashing_supports(SimpleNamespace(shell=shell)) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"), [("adjustment", -0.02), ("force_limit", 0.0), ("force_limit", np.nan)]
+)
+def test_a_turnbuckle_s_range_or_a_limit_that_is_none_is_refused(built, name, wrong):
+    with pytest.raises(InputError, match=f"{name}: must be .*or leave it out"):
+        replace(built, **{name: wrong})

@@ -154,6 +154,9 @@ def test_beams_are_made_once_for_a_radius_and_anew_for_another(shell):
 def test_limits_that_make_no_sense_are_refused(shell, wet):
     with pytest.raises(InputError, match=r"least_tension\.scale"):
         LeastTension("wet", 0.0)
+    for far in (0.0, np.nan, 105):
+        with pytest.raises(InputError, match=r"least_tension\.let_out: must be.*such as 1\.05"):
+            LeastTension("wet", 0.5, let_out=far)
     with pytest.raises(InputError, match=r"largest_cable_force\.scale"):
         LargestCableForce("wet", 0.0)
     with pytest.raises(InputError, match=r"modal_stiffness\.scale"):

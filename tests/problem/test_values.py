@@ -285,6 +285,16 @@ def test_blocks_that_change_the_same_cable_or_radius_or_have_no_units_are_refuse
             Blocks([Knob(rates=rates)], dome, start)
 
 
+def test_a_free_radius_has_bounds_in_metres_the_lower_below_the_upper_one(dome):
+    start = dome.design()
+    for wrong in ((0.002, 0.001), (-0.001, 0.001), (0.001, np.inf), (0.5, 2.0), (np.nan, 0.002)):
+        with pytest.raises(
+            InputError, match=r"variables\.radius: .*below 100 times.*Give metres, such as 0\.00025"
+        ):
+            sf.FreeRadius(*wrong).bounds(dome, start)
+    assert [each.item() for each in sf.FreeRadius(0.0005, 0.05).bounds(dome, start)] == [0.0005, 0.05]
+
+
 def test_rest_lengths_bounds_are_positive():
     for wrong in ({"least": 0.0}, {"most": 0.0}, {"least": -0.01}):
         with pytest.raises(InputError, match=r"variables\.rest_lengths"):

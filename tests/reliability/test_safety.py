@@ -87,6 +87,8 @@ def test_as_many_may_fall_as_the_required_probability_allows():
         ({"drawn": 0}, "safety.drawn"),
         ({"stiffness": 0.0}, "safety.stiffness"),
         ({"enlarged": 0.5}, "safety.enlarged"),
+        ({"margin": -0.1}, "safety.margin"),
+        ({"margin": float("nan")}, "safety.margin"),
     ],
 )
 def test_what_cannot_be_asked_for_is_refused(entries, where):

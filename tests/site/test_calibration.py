@@ -225,6 +225,13 @@ def test_calibrations_that_can_t_be_done_are_refused(shell, loads, markers):
         calibrate(shell, plain, [scan], np.repeat(markers[:5], 2))
     with pytest.raises(InputError, match="isn't a connector's stiffness"):
         calibrate(shell, plain, [scan], markers, free=["gap"])
+    for noise in (0.0, -1e-4, np.nan):
+        with pytest.raises(InputError, match="--noise: must be between"):
+            calibrate(shell, plain, [scan], markers, noise=noise)
+        with pytest.raises(InputError, match="--noise: must be between"):
+            foresee(shell, plain, loads, markers, noise=noise)
+    with pytest.raises(InputError, match=r"calibrate\.reach: must be positive"):
+        calibrate(shell, plain, [scan], markers, reach=0.0)
     with pytest.raises(InputError, match="at least one scan"):
         calibrate(shell, plain, [], markers)
     with pytest.raises(InputError, match="loads\\[0\\] has the wrong shape"):

@@ -196,6 +196,11 @@ def test_what_a_crew_or_a_survey_can_t_be_is_refused(shell, belief, errors, uppe
         learn(shell, belief, upper, np.full((len(upper), 3), np.nan), noise=NOISE)
     with pytest.raises(InputError, match="must be positive"):
         learn(shell, belief, upper, np.zeros((len(upper), 3)), noise=0.0)
+    goal, crew = belief.state.positions, Crew(1e-3, 1e-3, 5)
+    with pytest.raises(InputError, match="--noise: must be between"):
+        adjust(shell, belief, goal, crew, noise=-1e-4)
+    with pytest.raises(InputError, match=r"--slip: must be between 0 and 1.*For 5 % write 0\.05"):
+        replay(shell, belief, errors, goal, upper, crew, noise=NOISE, rounds=1, seed=0, slip=5)
     with pytest.raises(NotConverged, match=r"Plant smaller errors|however small"):
         replay(
             shell,

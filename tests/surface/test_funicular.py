@@ -295,6 +295,8 @@ def test_the_thrust_shell_nearest_to_one_is_itself_and_to_a_dome_is_near():
     np.testing.assert_allclose(again.vertices, near.vertices, atol=1e-3 * away)
     with pytest.raises(InputError, match="stands on the ground"):
         nearest_thrust_shell(dome, ground=-5.0)
+    with pytest.raises(InputError, match=r"ground: must be below 0\.2.*metres below its top"):
+        nearest_thrust_shell(dome, ground=50.0)
 
 
 @pytest.mark.parametrize("ending", ["step", "igs", "brep"])
@@ -311,6 +313,9 @@ def test_what_one_b_spline_can_not_be_is_not_written(tmp_path):
     shell = thrust_shell(SQUARE, rise=3.0, size=0.5)
     with pytest.raises(NotConverged, match="m off"):
         cad.write_fitted(tmp_path / "shell.step", shell, within=1e-9)
+    for within in (0.0, 5.0, np.nan):
+        with pytest.raises(InputError, match=r"within: must be .*a share of the surface's size"):
+            cad.write_fitted(tmp_path / "shell.step", shell, within=within)
     with pytest.raises(InputError, match="isn't a CAD file"):
         cad.write_fitted(tmp_path / "shell.obj", shell)
     hole = thrust_shell(SQUARE, rise=3.0, size=0.5, openings=[[(-1, -1), (1, -1), (1, 1), (-1, 1)]])
@@ -319,7 +324,7 @@ def test_what_one_b_spline_can_not_be_is_not_written(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("least", [0.0, -0.1, np.nan, np.inf])
+@pytest.mark.parametrize("least", [0.0, -0.1, 5.0, np.nan, np.inf])
 def test_densities_that_may_come_to_nothing_are_refused(least):
     """With nothing as the least a shell's branches might hang slack."""
     nodes, edges, loads, fixed = line(3, -1.0)
@@ -329,3 +334,5 @@ def test_densities_that_may_come_to_nothing_are_refused(least):
         InputError, match=r"least: .*\(found .*\)\. Give a share of their mean, such as 0\.05"
     ):
         fitted_densities(nodes, edges, loads, fixed, least=least)
+    with pytest.raises(InputError, match=r"For 5 % write 0\.05\."):
+        fitted_densities(nodes, edges, loads, fixed, least=5)

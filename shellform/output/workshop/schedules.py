@@ -34,7 +34,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals, Record
-from shellform.errors import InputError, how_many
+from shellform.errors import InputError, how_many, require_number
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import cut_lengths
@@ -88,6 +88,12 @@ class Built(Record):
     def __post_init__(self) -> None:
         if "none" not in self.states:
             raise InputError("no state without load", value=list(self.states), remedy="Add it as 'none'.")
+        if self.adjustment is not None:
+            give = "metres of the turnbuckles' range, such as 0.02, or leave it out"
+            require_number(self.adjustment, least=0.0, where="adjustment", give=give)
+        if self.force_limit is not None:
+            give = "newtons that a cable may pull, such as 20, or leave it out"
+            require_number(self.force_limit, above=0.0, where="force_limit", give=give)
 
     @property
     def grid(self) -> Grid:
