@@ -87,12 +87,12 @@ from shellform.reliability.drawing import Errors as Errors
 from shellform.reliability.drawing import Imperfections as Imperfections
 from shellform.reliability.path_of_one import Limit as Limit
 from shellform.reliability.probability import Standing as Standing
+from shellform.reliability.requirements import Demand as Demand
+from shellform.reliability.requirements import Required as Required
 from shellform.reliability.safety import Judgement as Judgement
 from shellform.reliability.safety import Safety as Safety
 from shellform.reliability.safety import UnderLoad as UnderLoad
 from shellform.reliability.safety import judge as judge
-from shellform.reliability.trial_structures import Demand as Demand
-from shellform.reliability.trial_structures import Required as Required
 from shellform.site import calibration as calibration
 from shellform.site import erection as erection
 from shellform.site import retensioning as retensioning

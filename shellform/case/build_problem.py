@@ -36,7 +36,7 @@ from shellform.problem.problem import LoadCase, Problem
 from shellform.problem.terms import CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
 from shellform.problem.variables import FreeRadius, RestLengths, Variable
 from shellform.reliability.built_misfit import built_misfit
-from shellform.reliability.trial_structures import SEED
+from shellform.reliability.requirements import SEED
 from shellform.structure.answers import results
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams

@@ -24,7 +24,7 @@ def case_tolerances(case: Case, shell: Gridshell) -> Tolerances:
 
 def case_safety(case: Case, shell: Gridshell) -> Safety | None:
     """What a search has to keep; None where nothing is required. Its seed is the one by which a finished
-    design is judged; a search draws under another (reliability/trial_structures.py), so that the sample that
+    design is judged; a search draws under another (reliability/requirements.py), so that the sample that
     is told is a fresh one."""
     entry = case.safety
     if not is_required(case):

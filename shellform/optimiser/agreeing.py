@@ -14,11 +14,11 @@ from dataclasses import replace
 
 from shellform.optimiser.descent import descend
 from shellform.optimiser.going_back import last_sound
-from shellform.optimiser.minding import WORTH_A_TURN, finely, led_by, turned
+from shellform.optimiser.minding import WORTH_A_TURN, begin_turn, finely, lead_by
 from shellform.optimiser.optimum import worse
 from shellform.optimiser.search_state import Iterate, Search, accepted_design, taut_count
 from shellform.optimiser.trials import fresh, sound
-from shellform.reliability.trial_structures import aims
+from shellform.reliability.demands import aims
 
 _MORE = 0.2  # of all evaluations, that come on top where a sample disagrees
 _MOST = 12  # samples, after which a turn without a step is the last
@@ -79,10 +79,10 @@ def agreed(search: Search, it: Iterate) -> tuple[bool, Iterate]:
             if it.mind is None or it.paused or not found < worse(before, -WORTH_A_TURN):
                 break
         least = {} if judged.stands else aims(asked.sample(it.samples), judged)
-        it = led_by(search, it, it.accepted[-1].built, least)
+        it = lead_by(search, it, it.accepted[-1].built, least)
         if it.mind is None or search.left() <= 0:
             break
-        it = turned(search, replace(it, begun=len(it.accepted)))
+        it = begin_turn(search, replace(it, begun=len(it.accepted)))
     if it.stood in (0, len(it.accepted)):
         return it.stood > 0, it
     back = last_sound(search, replace(it, accepted=it.accepted[: it.stood]))

@@ -12,7 +12,7 @@ import numpy as np
 from shellform.optimiser.search_state import Accepted, Iterate, Search, accepted_design
 from shellform.optimiser.trials import confirmed, sound, standing
 from shellform.problem.evaluation import Evaluated
-from shellform.reliability.trial_structures import Required
+from shellform.reliability.requirements import Required
 
 
 def last_confirmed(search: Search, it: Iterate) -> Iterate:

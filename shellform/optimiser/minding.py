@@ -32,8 +32,9 @@ from shellform.optimiser.search_state import (
 from shellform.optimiser.step_model import StepModel
 from shellform.optimiser.trials import sound, standing
 from shellform.problem.evaluation import OffBranch
+from shellform.reliability.demands import to_bear
 from shellform.reliability.drawing import PERFECT
-from shellform.reliability.trial_structures import closer, to_bear
+from shellform.reliability.requirements import closer
 
 _SHARE = 0.1  # of all evaluations, for one turn of a descent and a judgement at the most …
 _FEWEST = 4  # … but so many at least
@@ -50,8 +51,10 @@ def ready_to_lead(search: Search, it: Iterate, fell: Design) -> Iterate | None:
     """The iterate, at a design that stands as built, ready to be led by the structures that fall in the
     design that `fell`; None where there are none to be followed."""
     search = looking_closer(search)
-    led = led_by(search, it, it.accepted[-1].built, falling(search, it, fell))
-    return None if led.mind is None else turned(search, replace(led, phase="lead", stood=len(it.accepted)))
+    led = lead_by(search, it, it.accepted[-1].built, falling(search, it, fell))
+    return (
+        None if led.mind is None else begin_turn(search, replace(led, phase="lead", stood=len(it.accepted)))
+    )
 
 
 def looking_closer(search: Search) -> Search:
@@ -59,7 +62,7 @@ def looking_closer(search: Search) -> Search:
     return search if search.asked is None else replace(search, asked=closer(search.asked))
 
 
-def led(search: Search, it: Iterate) -> Iterate:
+def lead(search: Search, it: Iterate) -> Iterate:
     """After turns of a descent and a judgement, as long as they lead to a better design that stands as built:
     at the last one that does, or where none does at the one that stood before."""
     last = int(_LED * search.evaluations)
@@ -78,16 +81,18 @@ def led(search: Search, it: Iterate) -> Iterate:
                 break
         if search.evaluator.evaluations >= last:
             break
-        it = turned(search, remembering(search, it) if holds else joined(search, it, it.accepted[-1].built))
+        it = begin_turn(
+            search, remembering(search, it) if holds else add_fallen(search, it, it.accepted[-1].built)
+        )
     back = last_sound(search, replace(it, accepted=it.accepted[: it.stood]))
     if it.led_to < np.inf:
         return remembering(search, back)
     return restiffened(search, replace(back, mind=None, remembered=None), back.stiffness)
 
 
-def joined(search: Search, it: Iterate, design: Design) -> Iterate:
+def add_fallen(search: Search, it: Iterate, design: Design) -> Iterate:
     """With those structures in mind too that fall in the design."""
-    return led_by(search, it, design, falling(search, it, design))
+    return lead_by(search, it, design, falling(search, it, design))
 
 
 def finely(search: Search, until: int) -> Search:
@@ -96,7 +101,7 @@ def finely(search: Search, until: int) -> Search:
     return replace(search, solver=fine, evaluations=min(search.evaluations, until))
 
 
-def turned(search: Search, it: Iterate) -> Iterate:
+def begin_turn(search: Search, it: Iterate) -> Iterate:
     """At the begin of a turn."""
     until = search.evaluator.evaluations + max(_FEWEST, int(_SHARE * search.evaluations))
     return replace(it, until=until, before=float("inf"), guarded=True, window=_WINDOW * search.tension)
@@ -114,7 +119,7 @@ def falling(search: Search, it: Iterate, design: Design) -> dict[int, float]:
         return {}
 
 
-def led_by(search: Search, it: Iterate, design: Design, least: Mapping[int, float]) -> Iterate:
+def lead_by(search: Search, it: Iterate, design: Design, least: Mapping[int, float]) -> Iterate:
     """With these structures in mind too, and a little more than what they are to bear as the aim."""
     return minding(search, it, design, {number: _OVER * factor for number, factor in least.items()})
 

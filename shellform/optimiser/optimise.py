@@ -79,10 +79,12 @@ from shellform.problem.evaluation import Evaluator
 from shellform.problem.paths import deviations
 from shellform.problem.problem import Problem
 from shellform.problem.terms import Bulges, Misfit, Share
+from shellform.reliability.demands import demand
 from shellform.reliability.guide import stretch_deviation
 from shellform.reliability.perfect import perfect
+from shellform.reliability.requirements import Demand
 from shellform.reliability.safety import Safety
-from shellform.reliability.trial_structures import Demand, Judging, demand
+from shellform.reliability.trial_structures import Judging
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.threads import dense_on_one
 from shellform.structure.network import assemble
@@ -143,10 +145,10 @@ def optimise(
             solver,
             lambda softest: share * softest,
             evaluations,
-            progress,
-            keep,
-            asked,
-            judging,
+            progress=progress,
+            keep=keep,
+            asked=asked,
+            judging=judging,
         )
         if resume is not None:
             search, it = resumed(search, resume)
@@ -236,7 +238,7 @@ def _polished(
             solver,
             lambda _: solver.stiffness * best.stiffness,
             evaluations,
-            progress,
+            progress=progress,
             asked=asked,
             judging=judging,
         )
@@ -282,6 +284,7 @@ def begin(
     solver: SequentialConvex,
     kept: Callable[[float], float],
     evaluations: int,
+    *,
     progress: Watch | None = None,
     keep: Keep | None = None,
     asked: Demand | None = None,
@@ -339,13 +342,13 @@ def begin(
         models=Models(evaluator, solver, mean),
     )
     it = Iterate(
-        point,
-        (accepted_design(search, point),),
-        (record(search, point, stage, True, "climb"),),
-        stiffness,
-        stage,
-        search.first_window,
-        solver.margin,
+        point=point,
+        accepted=(accepted_design(search, point),),
+        history=(record(search, point, stage, True, "climb"),),
+        stiffness=stiffness,
+        stage=stage,
+        window=search.first_window,
+        margin=solver.margin,
         guarded=False,
         tensioned=np.zeros(int(start.present.sum()), dtype=bool),
         excess=np.zeros(len(point.constraints)),

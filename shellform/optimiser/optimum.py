@@ -12,7 +12,7 @@ from shellform.arrays import Reals, Record
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design
 from shellform.problem.problem import Problem
-from shellform.reliability.trial_structures import Demand
+from shellform.reliability.requirements import Demand
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import Loaded
 

@@ -16,8 +16,8 @@ from shellform.optimiser.agreeing import agreed, leaving_some, pausing
 from shellform.optimiser.descent import climb, descend
 from shellform.optimiser.going_back import last_confirmed, last_sound, last_standing
 from shellform.optimiser.minding import (
-    joined,
-    led,
+    add_fallen,
+    lead,
     looking_closer,
     missed_without,
     ready_to_lead,
@@ -108,7 +108,7 @@ def _stiffened(search: Search, it: Iterate) -> Iterate:
 def _led(search: Search, it: Iterate) -> Iterate:
     """Ready to thin at a design to which drawn structures have led; where they lead to none, at the last one
     that stood."""
-    it = led(search, it)
+    it = lead(search, it)
     return _ready_as_it_is(search, it) if it.mind is None else _ready_to_thin(search, it)
 
 
@@ -144,7 +144,7 @@ def _made_to_stand(
         if not more or before <= 0.0 or search.left() <= 0:
             break
         if it.mind is not None:
-            it = joined(search, replace(it, point=found), accepted_design(search, found).built)
+            it = add_fallen(search, replace(it, point=found), accepted_design(search, found).built)
             trial, it = _repaired(search, it, it.point)
             continue
         it = restiffened(search, replace(it, point=found), solver.stiffer * before)

@@ -22,9 +22,10 @@ from shellform.problem.engineering import ModalStiffness
 from shellform.problem.evaluation import Evaluated, Evaluator
 from shellform.problem.paths import follow, in_tension, without_slack
 from shellform.problem.problem import FEASIBLE, LoadCase, Problem
+from shellform.reliability.requirements import SEED, Demand, largest_on_path
 from shellform.reliability.scenarios import FactorsAsBuilt, scenarios
 from shellform.reliability.scenarios import remembered as remembered_in
-from shellform.reliability.trial_structures import SEED, Demand, Judging, largest_on_path
+from shellform.reliability.trial_structures import Judging
 from shellform.structure.solve.loading import Loaded
 
 Watch = Callable[[Step], None]

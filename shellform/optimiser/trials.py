@@ -26,7 +26,8 @@ from shellform.optimiser.search_state import (
 from shellform.optimiser.step_model import StepModel
 from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch
 from shellform.problem.paths import follow
-from shellform.reliability.trial_structures import FRESH, JudgedTrial, Required, confirm, judge_trial
+from shellform.reliability.requirements import FRESH, Required
+from shellform.reliability.trial_structures import JudgedTrial, confirm, judge_trial
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import SMALLEST, apply_load
 

@@ -41,7 +41,7 @@ class Safety:
       median cable is off by.
     - `drawn`, `seed`: structures with which a finished design is judged.
     - `tried`, `enlarged`: structures with which a search judges, under a seed of their own, their errors
-      larger by this factor (trial_structures.py).
+      larger by this factor (requirements.py).
     """
 
     tolerances: Tolerances

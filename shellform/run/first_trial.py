@@ -2,7 +2,7 @@
 
 Two elements a segment are enough for that: they change critical factors by half a percent. Structures are
 drawn with errors of building a quarter larger than they are to be expected: few of them then refuse what else
-more would be needed for (trial_structures.py).
+more would be needed for (requirements.py).
 """
 
 from __future__ import annotations
@@ -176,14 +176,14 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
     stress = shell.utilisation(design, stressed)
     breaks = net.grid.rod_ends[int(np.argmax(stress))]
     return Followed(
-        factor,
-        float(stress.max()),
-        edge_utilisation(shell, beams, beams.local_forces(stressed)),
-        float(off[net.edge_lines].max(initial=0.0)),
-        float(off.max()),
-        float(shell.cables(design).tension(stressed).max(initial=0.0)) / parts.rope.force_max,
-        shell.target.positions[int(np.argmax(away))],
-        shell.target.positions[breaks].mean(axis=0),
+        factor=factor,
+        stress=float(stress.max()),
+        edge=edge_utilisation(shell, beams, beams.local_forces(stressed)),
+        sag=float(off[net.edge_lines].max(initial=0.0)),
+        off=float(off.max()),
+        pull=float(shell.cables(design).tension(stressed).max(initial=0.0)) / parts.rope.force_max,
+        where=shell.target.positions[int(np.argmax(away))],
+        most_stressed=shell.target.positions[breaks].mean(axis=0),
     )
 
 

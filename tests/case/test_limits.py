@@ -17,7 +17,7 @@ from shellform.gridshell.reactions import reactions
 from shellform.optimiser import rounding
 from shellform.records.progress import Kind
 from shellform.reliability.built_misfit import PAIRS, PAIRS_OF_DEVIATIONS, built_misfit
-from shellform.reliability.trial_structures import SEED
+from shellform.reliability.requirements import SEED
 from shellform.run.designs import load_record
 from shellform.run.folder import read_run
 from shellform.run.optimising import _solver

@@ -13,7 +13,8 @@ from shellform.optimiser.optimise import begin
 from shellform.optimiser.optimum import Checkpoint
 from shellform.optimiser.resuming import resumed
 from shellform.optimiser.search_state import accepted_design
-from shellform.reliability.trial_structures import FRESH, Demand, JudgedTrial, Required
+from shellform.reliability.requirements import FRESH, Demand, Required
+from shellform.reliability.trial_structures import JudgedTrial
 from tests.problems import misfit_and_force
 
 ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)

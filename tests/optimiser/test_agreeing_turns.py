@@ -32,7 +32,7 @@ def samples(search, monkeypatch):
     def sound(search, last):
         return SimpleNamespace(objective=last.objective) if last.objective != 0.666 else None
 
-    def led_by(search, it, built, least):
+    def lead_by(search, it, built, least):
         told.log.append((built, least))
         return replace(it, mind="some")
 
@@ -40,7 +40,7 @@ def samples(search, monkeypatch):
     monkeypatch.setattr(agreeing, "sound", sound)
     monkeypatch.setattr(agreeing, "accepted_design", lambda search, found: accepted_one(found.objective))
     monkeypatch.setattr(agreeing, "aims", lambda asked, judged: asked)
-    monkeypatch.setattr(agreeing, "led_by", led_by)
+    monkeypatch.setattr(agreeing, "lead_by", lead_by)
     monkeypatch.setattr(agreeing, "last_sound", lambda search, it: it)
     monkeypatch.setattr(agreeing, "descend", descend)
     told.agreed = lambda it=None: agreeing.agreed(search, it or iterate(1.0, phase="agree"))

@@ -6,28 +6,18 @@ import numpy as np
 import pytest
 
 import shellform as sf
+from shellform.gridshell.tolerances import enlarged
 from shellform.optimiser import optimise as optimiser
 from shellform.optimiser import trials
 from shellform.optimiser.solver import POLISHING
 from shellform.problem.paths import deviations
 from shellform.problem.terms import LoadedDesign
-from shellform.reliability import trial_structures
+from shellform.reliability import demands
+from shellform.reliability.demands import demand, required
+from shellform.reliability.requirements import FRESH, MOST, SEED, Demand, Required
 from shellform.reliability.scenarios import scenarios
 from shellform.reliability.standing import sample
-from shellform.reliability.trial_structures import (
-    FRESH,
-    MOST,
-    SEED,
-    Demand,
-    JudgedTrial,
-    Required,
-    confirm,
-    demand,
-    enlarged,
-    judge_trial,
-    required,
-    try_structures,
-)
+from shellform.reliability.trial_structures import JudgedTrial, confirm, judge_trial, try_structures
 from tests.problems import misfit_and_force
 
 ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
@@ -269,7 +259,7 @@ def test_numbers_make_up_for_errors_that_the_start_doesnt_bear_as_large_as_asked
     def bears_half(shell, start, asked, **_):
         return JudgedTrial(dict.fromkeys(asked.loads, ()), True, asked.safety.enlarged <= 1.25, 0)
 
-    monkeypatch.setattr(trial_structures, "try_structures", bears_half)
+    monkeypatch.setattr(demands, "try_structures", bears_half)
     asked = replace(ASKED, enlarged=1.5)
     found = demand(stout, stout.design(), {"wet": problem.loads["wet"]}, asked, design_load="wet")
     assert (found.trial.safety.enlarged, found.trial.safety.tried) == (1.25, MOST)

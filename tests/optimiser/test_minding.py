@@ -9,16 +9,18 @@ import pytest
 
 import shellform as sf
 from shellform.optimiser import minding, phases, search_state, trials
-from shellform.optimiser.minding import joined, ready_to_lead
+from shellform.optimiser.minding import add_fallen, ready_to_lead
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.optimum import Checkpoint
 from shellform.optimiser.resuming import resumed, tell
 from shellform.optimiser.search_state import accepted_design, merit, missed, violation
 from shellform.problem.evaluation import OffBranch
 from shellform.problem.terms import LoadedDesign
+from shellform.reliability.demands import to_bear
 from shellform.reliability.drawing import PERFECT
+from shellform.reliability.requirements import Demand, Required, closer
 from shellform.reliability.scenarios import FactorsAsBuilt, Scenario
-from shellform.reliability.trial_structures import Demand, JudgedTrial, Required, closer, to_bear
+from shellform.reliability.trial_structures import JudgedTrial
 from tests.problems import misfit_and_force
 
 ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
@@ -71,7 +73,11 @@ def test_what_structures_in_mind_bear_is_an_aim_and_no_limit(searching, monkeypa
     assert merit(search, led.point) > led.point.objective + 1.5
     # those that fall later come first
     monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {2: 1.0})
-    assert [each.number for each in joined(search, led, led.accepted[-1].built).mind.scenarios] == [2, 0, 1]
+    assert [each.number for each in add_fallen(search, led, led.accepted[-1].built).mind.scenarios] == [
+        2,
+        0,
+        1,
+    ]
 
 
 def test_led_by_fresh_samples_those_that_fall_under_the_smallest_load_are_kept_in_mind(
@@ -173,7 +179,7 @@ def test_where_another_turn_leads_to_a_worse_design_the_search_goes_back_to_the_
 
     one_descent = minding.descend
     monkeypatch.setattr(minding, "descend", descend)
-    after = minding.led(search, led)
+    after = minding.lead(search, led)
     assert len(found) == 2
     assert found[1] > found[0]
     assert after.accepted[-1].objective == pytest.approx(found[0])
@@ -223,7 +229,7 @@ def test_a_cable_counts_for_what_structures_in_mind_would_lose_without_it(search
 def test_a_turn_takes_a_tenth_of_all_evaluations_and_four_at_the_least(searching, evaluations, turn):
     search, it, _ = searching
     spent = search.evaluator.evaluations
-    begun = minding.turned(replace(search, evaluations=evaluations), replace(it, window=7.0, before=0.1))
+    begun = minding.begin_turn(replace(search, evaluations=evaluations), replace(it, window=7.0, before=0.1))
     assert begun.until == spent + turn
     assert begun.before == np.inf
     assert begun.window == pytest.approx(0.05 * search.tension)

@@ -80,7 +80,7 @@ def test_where_a_structure_cannot_be_followed_nothing_changes(search, kept, erro
 
 
 def test_a_little_more_is_aimed_for_than_structures_are_to_bear(search, kept):
-    minding.led_by(search, iterate(), "here", {3: 1.0, 4: 0.5})
+    minding.lead_by(search, iterate(), "here", {3: 1.0, 4: 0.5})
     assert kept.minds == [("here", {3: 1.03, 4: 0.515})]
 
 
@@ -138,10 +138,10 @@ def test_a_turn_goes_in_fine_steps_and_no_further_than_the_search(search):
     search.solver = sf.SequentialConvex(smallest=0.001)
     assert minding.finely(search, 30).solver.smallest == 0.001
     search.evaluator.evaluations = 7
-    begun = minding.turned(search, iterate(before=0.1))
+    begun = minding.begin_turn(search, iterate(before=0.1))
     assert (begun.until, begun.before, begun.guarded, begun.window) == (17, np.inf, True, 0.2)
     search.evaluations = 35
-    assert minding.turned(search, iterate()).until == 11
+    assert minding.begin_turn(search, iterate()).until == 11
 
 
 def test_what_falls_is_tried_with_what_fell_first_and_a_design_without_equilibrium_has_nothing_to_follow(
@@ -203,14 +203,16 @@ def turns(search, monkeypatch):
     monkeypatch.setattr(
         minding, "standing", lambda search, it, built: told.judged.append(built) or (told.stands, it)
     )
-    monkeypatch.setattr(minding, "joined", lambda search, it, built: told.log.append(("joined", built)) or it)
+    monkeypatch.setattr(
+        minding, "add_fallen", lambda search, it, built: told.log.append(("joined", built)) or it
+    )
     monkeypatch.setattr(minding, "remembering", lambda search, it: told.log.append("remembering") or it)
     monkeypatch.setattr(minding, "last_sound", lambda search, it: it)
     monkeypatch.setattr(
         minding, "restiffened", lambda search, it, least: told.log.append(("as before", least, it.mind)) or it
     )
     monkeypatch.setattr(minding, "descend", descend)
-    told.led = lambda **changes: minding.led(search, iterate(1.0, mind="some", stood=1, until=10, **changes))
+    told.led = lambda **changes: minding.lead(search, iterate(1.0, mind="some", stood=1, until=10, **changes))
     return told
 
 

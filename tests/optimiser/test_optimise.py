@@ -16,8 +16,8 @@ from shellform.optimiser.optimum import Optimum, Step
 from shellform.optimiser.solver import POLISHING
 from shellform.problem.engineering import LeastTension
 from shellform.problem.problem import LoadCase, Problem
+from shellform.reliability.requirements import Demand
 from shellform.reliability.safety import Safety
-from shellform.reliability.trial_structures import Demand
 
 LOAD = np.full((2, 6), -1.0)
 
@@ -81,7 +81,7 @@ def test_a_search_keeps_the_larger_share_of_stiffness_that_solver_or_safety_asks
     sf.optimise(problem, "start", solver=sf.SequentialConvex(stiffness=0.7), safety=safety)
     assert [kept for *_, kept, _, _, _ in begun.asked] == pytest.approx([0.6, 1.0, 1.4])
     assert [evaluations for *_, evaluations, _, _ in begun.asked] == [9, 100, 100]
-    assert [rest[2] for *_, rest, _ in begun.asked] == [None, "asked", "asked"]
+    assert [named["asked"] for *_, named in begun.asked] == [None, "asked", "asked"]
 
 
 def test_a_design_is_to_stand_as_built_under_the_named_loads_or_all_no_less_than_the_initial_one(begun):

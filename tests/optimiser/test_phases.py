@@ -233,7 +233,7 @@ def falling(monkeypatch):
     monkeypatch.setattr(phases, "_repaired", repaired)
     monkeypatch.setattr(phases, "stiffness_of", stiffness_of)
     monkeypatch.setattr(phases, "aimed", lambda problem, least, mind: (problem, least, mind))
-    monkeypatch.setattr(phases, "joined", lambda search, it, built: replace(it, mind=(it.mind, built)))
+    monkeypatch.setattr(phases, "add_fallen", lambda search, it, built: replace(it, mind=(it.mind, built)))
     return told
 
 

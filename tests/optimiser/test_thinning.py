@@ -14,7 +14,8 @@ from shellform.optimiser.phases import _made_to_stand, _repaired, _thin
 from shellform.optimiser.proposal import _as_far_as_can_be
 from shellform.optimiser.search_state import restiffened, stiffness_of, violation
 from shellform.optimiser.thinning import Budget, farthest
-from shellform.reliability.trial_structures import Demand, JudgedTrial, Required
+from shellform.reliability.requirements import Demand, Required
+from shellform.reliability.trial_structures import JudgedTrial
 from tests.problems import misfit_and_force
 
 ASKED = sf.Safety(sf.Tolerances(cable_length=1e-4), critical_factor=None, tried=1)

@@ -11,7 +11,8 @@ from shellform.gridshell.gridshell import Design
 from shellform.optimiser import trials
 from shellform.optimiser.search_state import Accepted, Iterate
 from shellform.problem.evaluation import OffBranch
-from shellform.reliability.trial_structures import FRESH, JudgedTrial
+from shellform.reliability.requirements import FRESH
+from shellform.reliability.trial_structures import JudgedTrial
 
 NONE = np.zeros(0)
 

@@ -1,4 +1,4 @@
-"""The judge within a search: which structures it draws, and how many may fall."""
+"""The judge within a search: which structures it draws, and how many fall."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -9,20 +9,12 @@ import pytest
 from shellform.errors import NotConverged
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability import trial_structures
+from shellform.reliability.demands import aims
 from shellform.reliability.drawing import PERFECT
+from shellform.reliability.requirements import SEED, Required
 from shellform.reliability.safety import Safety
-from shellform.reliability.trial_structures import (
-    FRESH,
-    SEED,
-    Demand,
-    JudgedTrial,
-    Required,
-    aims,
-    to_bear,
-    try_structures,
-)
-
-ROUGH = Tolerances(supports=1e-4, load_each=0.1, load_all=0.4)
+from shellform.reliability.trial_structures import JudgedTrial, try_structures
+from tests.reliability.asked import LOADS, ROUGH, asked_of
 
 
 def test_a_search_draws_other_structures_than_those_by_which_its_result_is_judged_and_with_larger_errors(
@@ -54,54 +46,6 @@ def test_a_judgement_tells_how_many_structures_were_loaded_and_how_many_there_ar
     assert heard == [(4, 6), (6, 6)]
 
 
-def test_as_many_are_aimed_for_as_have_to_stand_and_three_beside_those_that_bear_most(nominal):
-    asked = Required(
-        Safety(ROUGH, critical_factor=None, drawn=10, tried=10),
-        {"design": nominal.load, "additional": 1.25 * nominal.load},
-        "design",
-        {"design": 0, "additional": 4},
-    )
-    factors = {number: 0.1 + 0.1 * number for number in range(10)}
-    fallen = {"design": (1, 0), "additional": (8, 0, 7, 1, 6, 2, 5, 3, 4)}
-    found = JudgedTrial(fallen, True, False, 0, factors)
-    assert aims(asked, found) == pytest.approx({0: 0.8, 1: 0.8, **dict.fromkeys(range(2, 9), 1.0)})
-    assert list(aims(asked, found)) == list(range(9)), (
-        "few may fall under the smaller load; what bears least first"
-    )
-    enough = JudgedTrial({"design": (), "additional": (1, 2, 3, 4)}, True, True, 0, factors)
-    assert aims(asked, enough) == {}
-
-
-def test_before_thinning_all_that_fall_are_aimed_for_where_more_do_than_may(dome, nominal, monkeypatch):
-    asked = Required(
-        Safety(ROUGH, critical_factor=None, drawn=10, tried=10),
-        {"design": nominal.load, "additional": 1.25 * nominal.load},
-        "design",
-        {"design": 0, "additional": 4},
-    )
-    factors = {number: 0.1 + 0.1 * number for number in range(10)}
-    found = JudgedTrial({"design": (), "additional": tuple(range(9))}, True, False, 0, factors)
-    monkeypatch.setattr(trial_structures, "try_structures", lambda *_, **__: found)
-    assert to_bear(dome, dome.design(), asked) == dict.fromkeys(range(9), 1.0)
-    may = JudgedTrial({"design": (), "additional": (1, 2, 3, 4)}, True, True, 0, factors)
-    monkeypatch.setattr(trial_structures, "try_structures", lambda *_, **__: may)
-    assert to_bear(dome, dome.design(), asked) == {}
-
-
-def test_fresh_samples_spare_one_fall_or_what_two_designs_that_fall_as_often_differ_by(nominal):
-    loads = {"design": nominal.load, "additional": 1.2 * nominal.load}
-    safety = Safety(ROUGH, critical_factor=None, drawn=200, tried=200, enlarged=1.0, probability_design=0.99)
-    for may, spared in (
-        ({"design": 2, "additional": 100}, (1, 90)),
-        ({"design": 5, "additional": 2}, (5, 1)),
-    ):
-        asked = Required(safety, loads, "design", may)
-        demand = Demand(asked, asked)
-        assert tuple(demand.sample(3).fallen.values()) == spared
-        assert demand.sample(3).first == 600
-        assert demand.unspared().sample(3).fallen == may
-
-
 def test_a_judgement_knows_what_each_structure_bears(dome, nominal):
     loads = {"design": nominal.load, "additional": 1.25 * nominal.load}
     asked = Required(
@@ -118,14 +62,7 @@ def test_a_judgement_knows_what_each_structure_bears(dome, nominal):
         }
 
 
-def asked_of(may, *, first=0, loads=None, **entries):
-    safety = Safety(ROUGH, **{"critical_factor": None, "tried": 6, "drawn": 20, "seed": 3, **entries})
-    return Required(safety, LOADS if loads is None else loads, "wet", may, first)
-
-
-DOWN = np.array([[0.0, 0.0, -6.0, 0.0, 0.0, 0.0]] * 2)
 ASIDE = np.array([[-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]] * 2)
-LOADS = {"wet": DOWN, "wetter": 1.25 * DOWN}
 
 
 class Tried:
@@ -224,139 +161,6 @@ def test_the_perfect_structure_is_to_bear_a_hundredth_more_than_its_critical_fac
     assert len(made.looked) == 1
 
 
-def test_larger_errors_let_as_many_fall_as_their_share_of_a_normal_distribution_says():
-    """P(P⁻¹(0.99) / 1.5) = 0.93952, P(P⁻¹(0.9) / 1.5) = 0.80355."""
-    for tried_, times, may in (
-        (100, 1.5, (6, 19)),
-        (40, 1.5, (2, 7)),
-        (12, 1.5, (0, 2)),
-        (100, 1.0, (1, 10)),
-    ):
-        safety = Safety(ROUGH, probability_additional=0.9, tried=tried_, enlarged=times)
-        known = tuple(trial_structures._known(safety, name, "wet") for name in ("wet", "wetter"))
-        assert known == may
-        alike = replace(safety, probability_additional=None)
-        assert trial_structures._known(alike, "wetter", "wet") == may[0]
-
-
-def test_where_the_start_shows_more_falls_than_the_probability_allows_as_many_may(monkeypatch):
-    safety = Safety(ROUGH, critical_factor=None, tried=40)
-    for shown, additional, may in (
-        ((5, 9), None, {"wet": 5, "wetter": 9}),
-        ((1, 0), None, {"wet": 2, "wetter": 2}),
-        ((5, 9), 0.9, {"wet": 5, "wetter": 7}),
-    ):
-        fell = {name: tuple(range(count)) for name, count in zip(LOADS, shown, strict=True)}
-        heard = []
-        monkeypatch.setattr(
-            trial_structures,
-            "try_structures",
-            lambda _shell, _start, asked, heard=heard, fell=fell, **how: (
-                heard.append((asked, how)) or JudgedTrial(fell, True, True, 0)
-            ),
-        )
-        given = replace(safety, probability_additional=additional)
-        loads = {**LOADS, "none": 0.0 * DOWN}
-        found = trial_structures.required(None, None, loads, given, design_load="wet")
-        assert found.fallen == may
-        (asked, how), *_ = heard
-        assert asked.fallen == {"wet": 40, "wetter": 40}, "none is refused"
-        assert not how["critical"]
-
-
-def test_a_closer_trial_takes_at_least_forty_structures_and_lets_as_large_a_share_fall():
-    for tried_, additional, may, closer_may in (
-        (12, None, {"wet": 1, "wetter": 5}, {"wet": 2, "wetter": 16}),
-        (12, 0.9, {"wet": 1, "wetter": 5}, {"wet": 2, "wetter": 7}),
-        (12, None, {"wet": 0, "wetter": 0}, {"wet": 2, "wetter": 2}),
-        (100, None, {"wet": 9, "wetter": 9}, {"wet": 6, "wetter": 9}),
-    ):
-        trial = asked_of(may, tried=tried_, probability_additional=additional)
-        found = trial_structures.closer(Demand(trial, None, trusted=False))
-        assert found.trial.fallen == closer_may
-        assert found.trial.safety.tried == max(40, tried_)
-        assert not found.trusted
-        assert found.confirmed is None
-
-
-def test_samples_follow_one_another_without_a_structure_in_two_of_them():
-    fresh = asked_of({"wet": 3, "wetter": 4}, first=FRESH, tried=6, enlarged=1.5)
-    demand = Demand(fresh, fresh)
-    assert demand.sample(0).numbers == range(FRESH, FRESH + 6)
-    assert demand.sample(2).numbers == range(FRESH + 12, FRESH + 18)
-    assert demand.after(3).sample(1).numbers == range(FRESH + 24, FRESH + 30)
-    lone = Demand(fresh, None)
-    assert lone.after(3) is lone
-    assert fresh.tolerances(FRESH - 1).supports == pytest.approx(1.5e-4)
-    assert fresh.tolerances(FRESH) == ROUGH, "whose errors are as they are"
-
-
-def test_a_fresh_sample_spares_nothing_below_none_and_no_further_than_the_probability(monkeypatch):
-    for may, spared in (
-        ({"wet": 0, "wetter": 0}, (0, 0)),
-        ({"wet": 3, "wetter": 3}, (3, 2)),
-        ({"wet": 2, "wetter": 10}, (1, 6)),
-    ):
-        fresh = asked_of(may, tried=40, enlarged=1.0, probability_design=0.95)
-        assert tuple(Demand(fresh, fresh).sample(0).fallen.values()) == spared
-
-
-class Bearing:
-    """A start that bears its loads with errors enlarged so many times and no more, of which so many fall
-    else."""
-
-    def __init__(self, monkeypatch, times, fallen=(0, 0)):
-        self.times, self.fell, self.heard = times, dict(zip(LOADS, map(range, fallen), strict=True)), []
-        monkeypatch.setattr(trial_structures, "try_structures", self)
-
-    def __call__(self, _shell, _start, asked, **_how):
-        self.heard.append((asked.safety.enlarged, asked.safety.tried, asked.safety.seed, dict(asked.fallen)))
-        fallen = {name: tuple(own) for name, own in self.fell.items()}
-        return JudgedTrial(fallen, True, asked.safety.enlarged <= self.times, 0)
-
-
-@pytest.mark.parametrize(
-    ("times", "enlarged_by", "tried_", "trusted"),
-    [(1.5, 1.5, 12, True), (1.25, 1.25, 40, False), (1.0, 1.0, 40, False)],
-)
-def test_errors_are_enlarged_as_far_as_the_start_bears_them_and_numbers_make_up_for_what_they_are_not(
-    monkeypatch, times, enlarged_by, tried_, trusted
-):
-    start = Bearing(monkeypatch, times)
-    safety = Safety(ROUGH, critical_factor=None, tried=12, drawn=150, seed=3, enlarged=1.5)
-    found = trial_structures.demand(None, None, LOADS, safety, design_load="wet")
-    assert (found.trial.safety.enlarged, found.trial.safety.tried, found.trusted) == (
-        enlarged_by,
-        tried_,
-        trusted,
-    )
-    expected = [(1.5, 12, 3, {"wet": 0, "wetter": 12}), (1.25, 40, 3, {"wet": 1, "wetter": 40})]
-    expected += [(1.0, 40, 3, {"wet": 40, "wetter": 40})]
-    assert start.heard == expected[: [1.5, 1.25, 1.0].index(times) + 1]
-    fresh = found.confirmed
-    assert (fresh.safety.enlarged, fresh.safety.tried, fresh.safety.seed, fresh.first) == (1.0, 150, 3, FRESH)
-    assert fresh.fallen == {"wet": 1, "wetter": 1}
-
-
-def test_trials_without_enlarged_errors_are_not_trusted_though_the_start_bears_them(monkeypatch):
-    Bearing(monkeypatch, 3.0)
-    safety = Safety(ROUGH, critical_factor=None, tried=12, drawn=60, enlarged=1.0)
-    assert not trial_structures.demand(None, None, LOADS, safety, design_load="wet").trusted
-
-
-def test_where_as_many_may_fall_as_of_the_start_those_are_counted_that_a_finished_design_is_judged_by(
-    monkeypatch,
-):
-    start = Bearing(monkeypatch, 1.5, fallen=(0, 7))
-    safety = Safety(ROUGH, critical_factor=None, tried=12, drawn=60, seed=3)
-    found = trial_structures.demand(None, None, LOADS, safety, design_load="wet")
-    assert found.trial.fallen == {"wet": 0, "wetter": 7}
-    assert start.heard[-1] == (1.0, 60, 3 - SEED, {"wet": 60, "wetter": 60})
-    fresh = found.confirmed
-    assert (fresh.fallen, fresh.first, fresh.safety.seed) == ({"wet": 0, "wetter": 7}, FRESH, 3)
-    assert found.trusted
-
-
 def test_a_design_without_unloaded_equilibrium_does_not_stand_and_tells_what_was_spent(monkeypatch):
     def none(*_, **__):
         raise NotConverged("no equilibrium", iterations=17)
@@ -388,19 +192,3 @@ def test_a_design_is_confirmed_where_its_critical_factor_is_kept_on_the_halved_m
         "what falls is looked at no further"
     )
     assert len(sought) == 1
-
-
-def test_what_falls_under_several_loads_is_to_bear_the_largest_before_thinning_and_the_smallest_at_the_end(
-    monkeypatch,
-):
-    asked = asked_of({"wet": 0, "wetter": 0})
-    found = JudgedTrial({"wet": (4,), "wetter": (4, 2)}, True, False, 0, {4: 0.3, 2: 0.9})
-    monkeypatch.setattr(trial_structures, "try_structures", lambda *_, **__: found)
-    assert to_bear(None, None, asked) == {4: 1.0, 2: 1.0}
-    assert aims(asked, found) == {4: pytest.approx(0.8), 2: 1.0}
-
-
-def test_of_those_that_fall_the_ones_that_bear_most_are_aimed_for_and_of_unknown_factors_nothing_is_expected():
-    fell = JudgedTrial({"wet": (1, 2, 3, 4, 5, 6)}, True, False, 0, {1: 0.5, 2: 0.1, 3: 0.9, 4: 0.7, 5: 0.3})
-    for may, nearest in ((0, (6, 2, 5, 1, 4, 3)), (3, (6, 2, 5, 1, 4, 3)), (4, (2, 5, 1, 4, 3)), (8, (3,))):
-        assert trial_structures._nearest(fell, "wet", may) == nearest
