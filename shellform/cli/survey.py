@@ -57,7 +57,17 @@ def survey(
             where="survey",
             remedy="Name a CSV file of the survey, or give --replay 4, say, without one.",
         )
-    options = onsite.Survey(design, load, unit, noise, length_error, step, largest, cables, after)
+    options = onsite.Survey(
+        design=design,
+        load=load,
+        unit=unit,
+        noise=noise,
+        length_error=length_error,
+        step=step,
+        largest=largest,
+        cables=cables,
+        after=after,
+    )
     if replay is not None:
         tell_lines(
             onsite.replay(run, options, rounds=replay, seed=seed, slip=slip, markers=markers, output=output)

@@ -113,17 +113,17 @@ def wish(
     usual = "utilisation" if film == "erection" else "deviation"
     endings = tuple(f".{each}" for each in chosen_kinds)
     return Wish(
-        design,
-        load,
-        quantity or usual,
-        limit,
-        view,
-        None if size is None else _pixels(size),
-        thickness,
-        transparent,
-        endings,
-        force_limit or 0.0,
-        paper,
+        design=design,
+        load=load,
+        quantity=quantity or usual,
+        limit=limit,
+        view=view,
+        size=None if size is None else _pixels(size),
+        thickness=thickness,
+        transparent=transparent,
+        endings=endings,
+        force_limit=force_limit or 0.0,
+        paper=paper,
     )
 
 

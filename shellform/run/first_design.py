@@ -354,7 +354,8 @@ class _Search:
         material = choice.section.material
         allowed = placed.net.max_radius(young=material.young, strength=material.strength)
         return FirstDesign(
-            spacing, self.reasons[spacing], placed, parts, thickness, tried, standing, DRAWN, allowed, tuple(self.told),
+            spacing=spacing, reason=self.reasons[spacing], placed=placed, parts=parts, thickness=thickness,
+            tried=tried, standing=standing, drawn=DRAWN, allowed=allowed, told=tuple(self.told),
         )  # fmt: skip
 
     def _solved(

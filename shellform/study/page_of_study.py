@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from shellform.errors import InputError
-from shellform.output.page.measures import found, given
+from shellform.output.page.measures import entry_measure, summary_measure
 from shellform.output.page.study_page import (
     StudyContent,
     StudyRow,
@@ -71,8 +71,8 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
         varied=own,
         found=list(entry.column),
         measures={
-            **{name: given(name.removeprefix("case.")) for name in own},
-            **{name: found(path) for name, path in entry.column.items()},
+            **{name: entry_measure(name.removeprefix("case.")) for name in own},
+            **{name: summary_measure(path) for name, path in entry.column.items()},
         },
         goals=signs,
         front=ordered,

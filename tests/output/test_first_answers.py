@@ -12,7 +12,7 @@ from shellform.gridshell.edge_beams import EdgeBeam
 from shellform.gridshell.layers import TwoLayers
 from shellform.output.page import first_answers
 from shellform.output.page.first_answers import answers
-from shellform.output.page.measures import found, given
+from shellform.output.page.measures import entry_measure, summary_measure
 from shellform.output.page.profile_table import profile_table
 from shellform.records.check import SLACK, Cell
 from shellform.records.profile import Profile, StageProfile, WorkRecord
@@ -264,18 +264,18 @@ def test_nothing_is_told_of_a_design_that_was_not_examined_and_no_share_of_an_un
 
 def test_quantities_have_units_of_handy_size():
     for measure, value, shown, unit in (
-        (found("designs.best.loads.design.deviation_max"), 0.0123, 12.3, "mm"),
-        (found("designs.best.loads.design.connector_turn_max"), np.pi / 6.0, 30.0, "°"),
-        (found("designs.best.loads.design.rod_utilisation_max"), 0.625, 62.5, "%"),
-        (found("designs.best.loads.design.cable_force_max"), 12.5, 12.5, "N"),
-        (found("designs.best.cables"), 84, 84, ""),
-        (found("x.unheard_of"), 7.5, 7.5, ""),
-        (given("net.spacing"), 0.055, 55.0, "mm"),
-        (given("net.angle"), 45.0, 45.0, "°"),
-        (given("rod.young"), 40e9, 40.0, "GPa"),
-        (given("rod.strength"), 255e6, 255.0, "MPa"),
-        (given("cable.stiffness"), 187.0, 187.0, "N"),
-        (given("load.additional"), 1.5, 1.5, ""),
+        (summary_measure("designs.best.loads.design.deviation_max"), 0.0123, 12.3, "mm"),
+        (summary_measure("designs.best.loads.design.connector_turn_max"), np.pi / 6.0, 30.0, "°"),
+        (summary_measure("designs.best.loads.design.rod_utilisation_max"), 0.625, 62.5, "%"),
+        (summary_measure("designs.best.loads.design.cable_force_max"), 12.5, 12.5, "N"),
+        (summary_measure("designs.best.cables"), 84, 84, ""),
+        (summary_measure("x.unheard_of"), 7.5, 7.5, ""),
+        (entry_measure("net.spacing"), 0.055, 55.0, "mm"),
+        (entry_measure("net.angle"), 45.0, 45.0, "°"),
+        (entry_measure("rod.young"), 40e9, 40.0, "GPa"),
+        (entry_measure("rod.strength"), 255e6, 255.0, "MPa"),
+        (entry_measure("cable.stiffness"), 187.0, 187.0, "N"),
+        (entry_measure("load.additional"), 1.5, 1.5, ""),
     ):
         assert (measure.factor * value, measure.unit) == (pytest.approx(shown), unit)
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from shellform.output.page import measures
-from shellform.output.page.measures import found as found_
-from shellform.output.page.measures import given as given_
+from shellform.output.page.measures import entry_measure, summary_measure
 from shellform.output.page.study_page import (
     StudyContent,
     StudyRow,
@@ -41,8 +40,8 @@ def content(**changes):
         "varied": ["case.net.spacing"],
         "found": ["misfit", "cables"],
         "measures": {
-            "case.net.spacing": given_("net.spacing"),
-            "misfit": found_("designs.best.loads.design.deviation_rms"),
+            "case.net.spacing": entry_measure("net.spacing"),
+            "misfit": summary_measure("designs.best.loads.design.deviation_rms"),
         },
         "goals": {"misfit": 1.0, "cables": 1.0},
         "front": ["k0", "k1"],
@@ -130,7 +129,7 @@ def test_columns_are_told_in_units_that_a_designer_uses():
     )
     for name in ("colour", "size"):
         assert f'select name="{name}"' in page
-    unknown = found_("net.something_new")
+    unknown = summary_measure("net.something_new")
     assert (unknown.words, unknown.unit, unknown.factor) == ("net.something_new", "", 1.0)
 
 

@@ -15,6 +15,7 @@ from shellform.structure.solve.drive import Drive, forces
 from shellform.structure.solve.equilibrium import find_equilibrium, newton
 from shellform.structure.solve.loading import advance
 from shellform.structure.solve.path import follow
+from shellform.structure.solve.walk import Lead
 from shellform.verification import exact
 from shellform.verification.models import CLAMP, chain, line, load_at, polyline
 
@@ -66,7 +67,7 @@ def test_arc_length_passes_both_limit_points_of_lee_s_frame():
 def test_a_led_displacement_gives_the_same_limit_as_the_arc_length():
     assembly, start, load, node = lee()
     by_arc = next(p for p in follow(assembly, start, forces(load), goal=2.5) if p.event)
-    points = list(follow(assembly, start, forces(load), lead=(node, 2, -55.0), first=0.02))
+    points = list(follow(assembly, start, forces(load), lead=Lead(node, 2, -55.0), first=0.02))
     by_lead = next(p for p in points if p.event == "limit point")
     assert by_lead.factor == pytest.approx(by_arc.factor, rel=1e-6)
     assert points[-1].equilibrium.state.positions[node, 2] == pytest.approx(
@@ -81,7 +82,7 @@ def test_imposed_displacements_drive_the_path_as_forces_do():
     network = plane(chain(points, (1e4, 1.0, 0.2, 0.2), {0: PIN, 16: PIN}))
     load = np.zeros((17, 6))
     load[8, 2] = -1.0
-    led = list(follow(assemble(network), at_rest(points), forces(load), lead=(8, 2, -0.15), first=0.1))
+    led = list(follow(assemble(network), at_rest(points), forces(load), lead=Lead(8, 2, -0.15), first=0.1))
     fixed = network.fixed.copy()
     fixed[8, 2] = True
     held = assemble(Network(points, network.beams, network.cables, fixed, network.imposed))
@@ -103,7 +104,7 @@ def test_a_goal_between_two_points_is_met_exactly_and_a_point_short_path_says_so
     with pytest.raises(InputError, match="must not be zero"):
         list(follow(assembly, start, forces(load), goal=0.0))
     with pytest.raises(InputError, match="can lead"):
-        list(follow(assembly, start, forces(load), lead=(0, 0, 1.0)))
+        list(follow(assembly, start, forces(load), lead=Lead(0, 0, 1.0)))
 
 
 def test_a_goal_that_lies_too_far_off_to_turn_to_is_met_by_smaller_steps(monkeypatch):

@@ -12,7 +12,7 @@ from shellform.structure.solve import path
 from shellform.structure.solve.drive import forces
 from shellform.structure.solve.equilibrium import Equilibrium
 from shellform.structure.solve.path import follow
-from shellform.structure.solve.walk import Missed, OnPath, Walk
+from shellform.structure.solve.walk import Lead, Missed, OnPath, Walk
 
 
 class Curve:
@@ -200,7 +200,7 @@ def test_a_path_that_the_load_leads_nowhere_either_is_given_up_where_it_is(monke
         followed(monkeypatch, Kinked(lambda x: 2.0 * x, wall=0.21), goal=1.0)
     led = Kinked(lambda x: 2.0 * x, wall=0.21, landing=0.3)
     with pytest.raises(NotConverged, match="could not be followed further"):
-        followed(monkeypatch, led, lead=(0, 2, 0.75))
+        followed(monkeypatch, led, lead=Lead(0, 2, 0.75))
     assert led.ends == [], "a displacement that leads does so alone"
 
 
@@ -272,15 +272,15 @@ def test_a_step_back_over_a_kink_is_missed(monkeypatch):
 
 def test_a_led_path_ends_at_its_displacement_with_a_last_step_that_goes_no_farther(monkeypatch):
     curve = Curve(lambda x: 2.0 * x, iterations=1)
-    points = followed(monkeypatch, curve, lead=(0, 2, 0.75))
+    points = followed(monkeypatch, curve, lead=Lead(0, 2, 0.75))
     assert curve.sizes == pytest.approx([0.075, 0.15, 0.3, 0.225])
     assert points[-1].equilibrium.state == pytest.approx(0.75)
     back = Curve(lambda x: -2.0 * x)
     with pytest.raises(NotConverged):
-        followed(monkeypatch, back, lead=(0, 2, -0.75), most=2)
+        followed(monkeypatch, back, lead=Lead(0, 2, -0.75), most=2)
     assert back.sizes[0] == pytest.approx(-0.075)
     with pytest.raises(InputError, match="must not be zero"):
-        followed(monkeypatch, Curve(lambda x: 2.0 * x), lead=(0, 2, 0.0))
+        followed(monkeypatch, Curve(lambda x: 2.0 * x), lead=Lead(0, 2, 0.0))
 
 
 def test_the_goal_of_a_path_of_pulls_against_the_load_is_less_than_nothing(monkeypatch):
@@ -291,13 +291,13 @@ def test_the_goal_of_a_path_of_pulls_against_the_load_is_less_than_nothing(monke
 
 def test_only_a_free_displacement_leads_and_counts_from_the_start():
     walk = SimpleNamespace(assembly=SimpleNamespace(free=np.array([1, 8, 14])))
-    assert (Walk.number(walk, (1, 2, -0.5)), Walk.number(walk, (2, 2, 1.0))) == (1, 2)
+    assert (Walk.number(walk, Lead(1, 2, -0.5)), Walk.number(walk, Lead(2, 2, 1.0))) == (1, 2)
     with pytest.raises(InputError, match="only a free displacement can lead") as told:
-        Walk.number(walk, (1, 1, -0.5))
+        Walk.number(walk, Lead(1, 1, -0.5))
     assert told.value.value == (1, 1)
     walk.start = at_rest(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]))
     there = at_rest(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 2.25]]))
-    assert Walk.displacement(walk, there, (1, 2, -0.5)) == -0.75
+    assert Walk.displacement(walk, there, Lead(1, 2, -0.5)) == -0.75
 
 
 def test_a_first_step_beyond_a_peak_and_a_valley_is_cut_until_it_meets_the_peak(monkeypatch):
@@ -328,7 +328,7 @@ def test_an_event_is_a_limit_point_where_the_load_turns_round_right_there_and_no
 
 def test_the_rate_of_a_path_s_first_point_has_the_sign_of_its_direction(monkeypatch):
     for first in (0.1, -0.1):
-        points = followed(monkeypatch, Curve(lambda x: 2.0 * x), lead=(0, 2, 10.0 * first))
+        points = followed(monkeypatch, Curve(lambda x: 2.0 * x), lead=Lead(0, 2, 10.0 * first))
         assert points[0].rate == pytest.approx(np.copysign(2.0, first))
     pulled = followed(monkeypatch, Curve(lambda x: 2.0 * x, iterations=1), goal=-0.3, first=1.0)
     assert pulled[0].rate == pytest.approx(-2.0)

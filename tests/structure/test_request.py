@@ -24,7 +24,7 @@ SOUND = {
     "limit": 30,
     "mode_count": 3,
     "critical_to": 3.0,
-    "count": 7,
+    "node_count": 7,
 }
 
 

@@ -82,7 +82,7 @@ _ENTRIES = {
 }
 
 
-def found(path: str) -> Measure:
+def summary_measure(path: str) -> Measure:
     """What stands at a path of the summary, with the design and the load that it is of."""
     *way, last = path.split(".")
     known = _FOUND.get(last)
@@ -99,6 +99,6 @@ def found(path: str) -> Measure:
     return Measure(f"{known.words}{under}{of}", known.unit, known.factor)
 
 
-def given(entry: str) -> Measure:
+def entry_measure(entry: str) -> Measure:
     """An entry of the case, by its dotted name."""
     return _ENTRIES.get(entry, Measure(entry))

@@ -85,7 +85,7 @@ def analyse(
     increments: int = 1,
     tolerance: float = TOLERANCE,
     method: str = "relaxation",
-    lead: Lead | None = None,
+    lead: tuple[int, int, float] | None = None,
     limit: int = LIMIT,
     mode_count: int = 0,
     critical_to: float | None = None,
@@ -102,7 +102,10 @@ def analyse(
     """
     began = time.perf_counter()
     chosen = chosen_load(model, load)
-    check_request(factor, increments, tolerance, method, lead, limit, mode_count, critical_to, len(chosen))
+    check_request(
+        factor=factor, increments=increments, tolerance=tolerance, method=method, lead=lead, limit=limit,
+        mode_count=mode_count, critical_to=critical_to, node_count=len(chosen),
+    )  # fmt: skip
     assembly = assemble(model.network)
     walk = _Analysis(model, assembly, chosen, factor, tolerance, limit, progress)
     message, converged = "", True
@@ -111,7 +114,7 @@ def analyse(
         walk.begin()
         origin = walk.state
         if method == "path":
-            walk.path(lead, increments)
+            walk.path(None if lead is None else Lead(*lead), increments)
         else:
             walk.increments(increments, method)
         if critical_to is not None:

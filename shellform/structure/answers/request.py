@@ -10,24 +10,24 @@ from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model
 from shellform.structure.network import Network
-from shellform.structure.solve.walk import Lead
 
 _MOST = 1_000_000  # increments: of the smallest structure they take 15 minutes
 METHODS = ("relaxation", "dynamic", "newton", "path")
 
 
 def check_request(
+    *,
     factor: float,
     increments: int,
     tolerance: float,
     method: str,
-    lead: Lead | None,
+    lead: tuple[int, int, float] | None,
     limit: int,
     mode_count: int,
     critical_to: float | None,
-    count: int,
+    node_count: int,
 ) -> None:
-    """Raises InputError for numbers, methods and leads that make no sense on `count` nodes."""
+    """Raises InputError for numbers, methods and leads that make no sense on so many nodes."""
     require_count(increments, where="--increments", give="a number of load steps, such as 10", most=_MOST)
     require_number(factor, where="--factor", give="a factor of the load, such as 1")
     if not 0.0 < tolerance < 1.0:
@@ -54,7 +54,7 @@ def check_request(
         )
     if lead is not None and not (
         len(lead) == 3
-        and 0 <= lead[0] < count
+        and 0 <= lead[0] < node_count
         and lead[1] in (0, 1, 2)
         and np.isfinite(lead[2])
         and lead[2] != 0.0
@@ -63,7 +63,7 @@ def check_request(
             "must be a node, an axis 0 to 2 and a displacement other than 0",
             where="--lead",
             value=lead,
-            remedy=f"For example {count // 2}:z:-0.05, of nodes from 0 to {count - 1}.",
+            remedy=f"For example {node_count // 2}:z:-0.05, of nodes from 0 to {node_count - 1}.",
         )
 
 

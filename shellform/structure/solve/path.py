@@ -77,7 +77,7 @@ def follow(
     walk = Walk(assembly, start, drive, tolerance, goal, lead)
     here = walk.point(start, 0.0, 0)
     if lead is not None:
-        size = first * lead[2]
+        size = first * lead.displacement
         onward = float(np.sign(size * here.tangent[walk.led]))
     else:
         size = first * abs(goal) * float(np.linalg.norm(here.tangent[walk.moving]))
@@ -121,11 +121,11 @@ def follow(
         if lead is None:
             if there.factor == goal:
                 return
-        elif abs(walk.displacement(there.state, lead)) >= abs(lead[2]) * (1.0 - 1e-9):
+        elif abs(walk.displacement(there.state, lead)) >= abs(lead.displacement) * (1.0 - 1e-9):
             return
         size *= float(np.clip(np.sqrt(_EASY / max(there.iterations, 1)), 0.5, _LONGEST))
         if lead is not None:
-            left = lead[2] - walk.displacement(there.state, lead)
+            left = lead.displacement - walk.displacement(there.state, lead)
             size = float(np.sign(left)) * min(abs(size), abs(left))
         here, view, began = there, seen, True
     raise walk.gave_up(here, f"The path did not come to its end within {most} points")

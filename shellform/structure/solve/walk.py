@@ -10,6 +10,7 @@ with as many negative eigenvalues it grows, or falls, as before.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +31,14 @@ _ITERATIONS = 12  # of Newton in one step
 _BISECTIONS = 30
 _LOCATED = 1e-7  # of the factor, as near as an event is located
 
-Lead = tuple[int, int, float]
-"""A degree of freedom that leads: the node, the axis 0 to 2, its displacement, m."""
+
+class Lead(NamedTuple):
+    """A degree of freedom that leads: the translation of the `node` along the `axis` 0 to 2 by the
+    `displacement`, m."""
+
+    node: int
+    axis: int
+    displacement: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,19 +113,20 @@ class Walk:
 
     def number(self, lead: Lead) -> int:
         """Place among the free degrees of freedom of the one that leads."""
-        found = np.flatnonzero(self.assembly.free == 6 * lead[0] + lead[1])
+        found = np.flatnonzero(self.assembly.free == 6 * lead.node + lead.axis)
         if not len(found):
             raise InputError(
                 "is held or doesn't exist; only a free displacement can lead",
                 where="path",
-                value=lead[:2],
+                value=(lead.node, lead.axis),
                 remedy="Choose a node that is free along that axis.",
             )
         return int(found[0])
 
     def displacement(self, state: State, lead: Lead) -> float:
         """Of the degree of freedom that leads, m, since the start."""
-        return float(state.positions[lead[0], lead[1]] - self.start.positions[lead[0], lead[1]])
+        place = lead.node, lead.axis
+        return float(state.positions[place] - self.start.positions[place])
 
     def between(self, before: State, after: State) -> Reals:
         """Translations (t,) of the free degrees of freedom from one state to the other; rotation vectors
