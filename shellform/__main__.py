@@ -7,7 +7,7 @@ import os
 import sys
 from typing import TextIO
 
-_STOPPED = 130
+from shellform.errors import STOPPED
 
 
 def main() -> None:
@@ -19,21 +19,21 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a terminal that knows fewer letters gets a question mark
             stream.reconfigure(errors="replace")
-    status: object = _STOPPED
+    status: object = STOPPED
     try:
         from shellform.cli.program import main as run
 
         run()
     except SystemExit as end:
         status = end.code
-        if status != _STOPPED:
+        if status != STOPPED:
             raise
     except KeyboardInterrupt:
         print("shellform: stopped", file=sys.stderr)
-    if status == _STOPPED:
+    if status == STOPPED:
         _flush(sys.stdout)
         _flush(sys.stderr)
-        os._exit(_STOPPED)
+        os._exit(STOPPED)
 
 
 def _flush(stream: TextIO) -> None:

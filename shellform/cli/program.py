@@ -27,9 +27,8 @@ from shellform.cli.study import study
 from shellform.cli.survey import survey
 from shellform.cli.terminal import refusal_words
 from shellform.cli.verify import verify
-from shellform.errors import InputError
+from shellform.errors import STOPPED, InputError
 
-_STOPPED = 130
 # bytes of addresses: where fewer were free, libraries ended the program or never came back
 _ROOM_TO_SOLVE, _ROOM_TO_DESIGN = 590_000_000, 1_200_000_000
 _SOLVING, _READING = ("analyse", "verify"), ("docs", "example")
@@ -105,16 +104,16 @@ def main() -> None:
         try:
             status = app(standalone_mode=False)  # typer turns Ctrl-C into a returned status
             heed()
-            if status == _STOPPED:
+            if status == STOPPED:
                 raise KeyboardInterrupt
             sys.exit(status if isinstance(status, int) else 0)
         except (KeyboardInterrupt, typer.Abort):
-            _leave(_KEPT, _STOPPED)
+            _leave(_KEPT, STOPPED)
         except typer.Exit as stop:
             sys.exit(stop.exit_code)
         except Exception as error:
             if pressed():  # compiled loops, and processes that read for this one, make errors of it
-                _leave(_KEPT, _STOPPED)
+                _leave(_KEPT, STOPPED)
             _fail(error)
 
 

@@ -26,6 +26,7 @@ from shellform.structure.elements.sections import Section, mass_per_length
 from shellform.surface.shape.target import Surface
 
 GRAVITY = 9.81  # m/s²: the paper's 700 g are 6.9 N
+CONCRETE = 2500.0  # kg/m³, wet, with its reinforcement
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def area_load(net: Net, surface: Surface, weight: float, region: Region = EVERYW
 
 
 def concrete(
-    net: Net, surface: Surface, *, thickness: float, density: float = 2500.0, region: Region = EVERYWHERE
+    net: Net, surface: Surface, *, thickness: float, density: float = CONCRETE, region: Region = EVERYWHERE
 ) -> Reals:
     """Load (n, 6) of wet concrete of a thickness, m, across the surface, and a density, kg/m³, where it is
     poured.

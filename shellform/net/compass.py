@@ -25,7 +25,7 @@ from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError
 from shellform.net.refusal import NoNet, Reason
 
-_ITERATIONS = 30
+_ITERATIONS = 30  # of Newton towards one point, at the most
 _CLOSE = 1e-10  # of the spacing
 _PARALLEL = 0.05  # sine of the angle between two rods, below which they run in one direction
 _MOST = 200_000  # crossings

@@ -38,13 +38,13 @@ SHEAR_STIFFNESS = 0.1
 REACH = 1.0  # spacing a step
 LIMIT = 200  # factorisations at one density; nets that are found take up to half of that
 _STALL = 40  # steps that bring the residual down by less than a fifth, once it is
-_LITTLE = 1e-3
+_LITTLE = 1e-3  # residual below which a pull that gains no more has stalled
 _SLENDERNESS = 50.0  # s/r
 _TORSION = 1.0 / 1.3  # GJ/EI of a round rod with Poisson's ratio 0.3
 _CONNECTOR = 10.0  # bending stiffness of a connector, EI/s a radian: stiff beside the rods
 _TETHER = 5.0  # of the springs that hold the net's place and direction, EI/s³
 TOLERANCE = 1e-8  # residual
-_LEADING = 1e-3
+_LEADING = 1e-3  # residual at which the springs of one density give way to the next
 
 Pulling = Callable[[str, float], None]
 """Called while a net is pulled with what is done and the residual."""

@@ -27,8 +27,7 @@ from shellform.structure.answers.sensitivity import element_columns
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
-
-_BLOCK = 256  # columns solved for at once
+from shellform.structure.solve.factorisation import COLUMNS
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,8 @@ def kept_stiffness(
     unit = np.sqrt(stiffness)[:, None] * chord / length[:, None]
     pull = element_columns(assembly, cables.dofs(), np.hstack([-unit, unit]))[:, some]
     factor, kept = assembly.factor(state), np.eye(pull.shape[1])
-    for first in range(0, len(kept), _BLOCK):
-        own = slice(first, min(first + _BLOCK, len(kept)))
+    for first in range(0, len(kept), COLUMNS):
+        own = slice(first, min(first + COLUMNS, len(kept)))
         kept[:, own] -= pull.T @ factor.solve(np.asfortranarray(pull[:, own].toarray()))
     return kept
 

@@ -28,7 +28,7 @@ from shellform.output.pictures.panel import Look, Panel
 from shellform.problem.paths import deviations
 from shellform.records.words import load_title, number
 
-_SIZE = (900, 560)
+_SIZE = (900, 560)  # pixels, of a picture
 _TALL = 760  # pixels, of the view's frame
 _SMALL = (560, 400)  # one of several side by side
 

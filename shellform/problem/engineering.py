@@ -36,7 +36,7 @@ SHARPNESS = 200.0
 # the same for slack cables: tensions change by many times their least in a step, so that a sharp maximum
 # would hop from cable to cable
 _EASED = 10.0
-_MODES = 4
+_MODES = 4  # the softest ones, which may change places
 BROKEN = 2.0  # times the rods' strength: what is beyond can only be per cents
 _TURN = 0.1  # rad, the unit of turns
 

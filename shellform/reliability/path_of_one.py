@@ -37,6 +37,7 @@ FAR = 0.05  # of the span from the perfect structure
 STEP = 1.0  # of the load: most structures bear it whole, and others are followed in smaller steps
 MARKED = 1 / 512  # of the load, next to a factor at which it counts on which side a structure falls
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
+RESOLUTION = 1 / 256  # of the load, to which it is found where it is told
 _RELAXING = 25  # steps to the unloaded state, before it is relaxed instead
 _BESIDE = 10  # factorisations from the perfect structure's loaded state
 _RELAXATIONS = 150  # factorisations of a relaxation: what takes more has none

@@ -16,7 +16,7 @@ from scipy.special import betaincinv  # scipy.stats would take a seventh of ever
 
 from shellform.errors import InputError, require_number
 
-CONFIDENCE = 0.95
+CONFIDENCE = 0.95  # with which bounds of a share are told, where no other is asked for
 
 
 @dataclass(frozen=True)

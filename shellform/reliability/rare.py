@@ -1,8 +1,8 @@
 """How rarely a design falls: subset simulation (subset.py) over the errors of its structures.
 
 The limit state of a structure is the load factor at which it loses its stable branch, less the factor 1 of
-the load that it has to bear. Factors are sought up to `MOST`, found to `RESOLUTION`, and beyond that taken as
-equal: where the better part of all structures bears more, the first level's bound lies among those that
+the load that it has to bear. Factors are sought up to `SOUGHT`, found to `RESOLUTION`, and beyond that taken
+as equal: where the better part of all structures bears more, the first level's bound lies among those that
 don't, and where all do, nothing fails.
 
 The factors come in an order that the seed decides alone: what was found before it was broken off is gone
@@ -21,12 +21,11 @@ from shellform.arrays import Reals
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import errors_of, sizes
 from shellform.reliability.members import Members
+from shellform.reliability.path_of_one import RESOLUTION, SOUGHT
 from shellform.reliability.standing import Workshop
 from shellform.reliability.subset import Rare, subset_simulation
 from shellform.structure.elements.threads import side_by_side
 
-MOST = 3.0  # load factor
-RESOLUTION = 1.0 / 256.0
 COUNT = 200  # samples a level: one in a thousand takes three levels, 560 structures
 _AT_ONCE = 10  # structures, before they are told
 _STEP = 0.25  # of the load, on a structure's path at first
@@ -49,7 +48,7 @@ def rare_failure(
     *,
     seed: int,
     count: int = COUNT,
-    most: float = MOST,
+    most: float = SOUGHT,
     known: Sequence[float] = (),
     tell: Callable[[Sequence[float]], None] | None = None,
 ) -> RareFailure:

@@ -17,14 +17,13 @@ from shellform.arrays import Reals
 from shellform.errors import InputError, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.path_of_one import Limit
+from shellform.reliability.path_of_one import RESOLUTION, Limit
 from shellform.reliability.perfect import TO_ITS_END, perfect
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
 from shellform.reliability.refinement import critical_of, model_under, rods_halved
 from shellform.reliability.standing import Workshop
 
-_SAME = 1e-9  # relative
-_RESOLUTION = 1 / 256  # of the load, to which a critical factor is found
+SAME = 1e-9  # relative: shares and factors of a load that count as equal
 
 
 @dataclass(frozen=True)
@@ -154,7 +153,7 @@ def judge(
             fallen = tuple(
                 each.number
                 for each in outcomes
-                if (not each.stands if share == 1.0 else each.factor < share * (1.0 - _SAME))
+                if (not each.stands if share == 1.0 else each.factor < share * (1.0 - SAME))
             )
             standing = counted(
                 safety.drawn, safety.drawn - len(fallen), seed=safety.seed, confidence=CONFIDENCE
@@ -173,7 +172,7 @@ def judge(
     critical = None
     if safety.critical_factor is not None:
         critical = critical_on_halved(shell, design, loads[design_load], safety.critical_factor)
-        if critical.factor < safety.critical_factor * (1.0 - _SAME):
+        if critical.factor < safety.critical_factor * (1.0 - SAME):
             failed.append(
                 f"the critical factor is {critical.factor:.3f} with rod elements halved, and "
                 f"{safety.critical_factor:g} is required"
@@ -186,7 +185,7 @@ def critical_on_halved(shell: Gridshell, design: Design, load: Reals, sought: fl
     halved, followed up to the factor `sought`; the factor 0 where the unloaded state isn't stable on that
     mesh. Raises NotConverged where there is none."""
     model = rods_halved(model_under(shell, design, load))
-    return critical_of(model, sought=sought, resolution=_RESOLUTION)
+    return critical_of(model, sought=sought, resolution=RESOLUTION)
 
 
 def paths(loads: Mapping[str, Reals]) -> dict[str, dict[str, float]]:
@@ -198,7 +197,7 @@ def paths(loads: Mapping[str, Reals]) -> dict[str, dict[str, float]]:
         for largest, shares in found.items():
             share = float(np.vdot(loads[name], loads[largest])) / size[largest] ** 2
             off = np.linalg.norm(loads[name] - share * loads[largest])
-            if share > 0.0 and off <= _SAME * size[name]:  # what pulls upwards has a path of its own
+            if share > 0.0 and off <= SAME * size[name]:  # what pulls upwards has a path of its own
                 shares[name] = share
                 break
         else:

@@ -20,7 +20,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.reliability.drawing import PERFECT, draw_errors
 from shellform.reliability.perfect import TO_ITS_END, Perfect, perfect
 from shellform.reliability.requirements import SEED, Required, critical_wanted
-from shellform.reliability.safety import critical_on_halved, paths
+from shellform.reliability.safety import SAME, critical_on_halved, paths
 from shellform.reliability.standing import Workshop
 from shellform.structure.elements.threads import in_turn
 
@@ -30,7 +30,6 @@ most."""
 
 _AT_ONCE = 4  # structures between two looks at how many have fallen
 _RESOLUTION = 1 / 32  # of the largest load, to which it is known where a structure falls
-_SAME = 1e-9  # relative
 
 
 @dataclass(frozen=True)
@@ -109,13 +108,13 @@ class _Count:
         """What one structure bears on a path."""
         self.spent += spent
         if number == PERFECT:
-            self.kept = factor >= path.wanted * (1.0 - _SAME)
+            self.kept = factor >= path.wanted * (1.0 - SAME)
             return
         if path.of_design_load:
             self.factors[number] = factor
         for name, share in path.shares.items():
             counts = number in self.asked.numbers or name == self.asked.design_load
-            if counts and factor < share * (1.0 - _SAME):
+            if counts and factor < share * (1.0 - SAME):
                 self.fallen[name].append(number)
 
     @property
@@ -190,7 +189,7 @@ def confirm(
     if not found.stands or factor is None:
         return found
     end = critical_on_halved(shell, design, asked.loads[asked.design_load], factor)
-    kept = end.factor >= factor * (1.0 - _SAME)
+    kept = end.factor >= factor * (1.0 - SAME)
     return replace(
         found, critical=kept, stands=kept, factorisations=found.factorisations + end.factorisations
     )

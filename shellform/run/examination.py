@@ -42,7 +42,7 @@ from shellform.reliability.path_of_one import SOUGHT
 from shellform.reliability.perfect import perfect
 from shellform.reliability.probability import counted
 from shellform.reliability.refinement import mesh_error
-from shellform.reliability.safety import paths
+from shellform.reliability.safety import SAME, paths
 from shellform.reliability.standing import Workshop
 from shellform.run.figures import FAILURE
 from shellform.run.folder import Run, read_run
@@ -56,7 +56,6 @@ from shellform.structure.elements.threads import side_by_side
 from shellform.written import write_arrays
 
 _BEYOND = 1.5  # times the factor asked for, up to which a path is followed at least
-_SAME = 1e-9  # relative
 _GUIDED = 0.25  # of the largest load, the steps in which the guide looks along the path
 
 
@@ -249,7 +248,7 @@ def _guided(each: Examined, largest: str, shares: Mapping[str, float], seed: int
     return {
         name: found.least_to(share)
         for name, share in shares.items()
-        if found.factors[-1] >= share * (1.0 - _SAME)
+        if found.factors[-1] >= share * (1.0 - SAME)
     }
 
 
@@ -258,7 +257,7 @@ def _standing(path: DrawnPath, share: float, case: Case) -> StandingRecord:
     fallen = {
         number: factor
         for number, (factor, stands) in enumerate(zip(path.factors, path.stand, strict=True))
-        if not stands and (share == 1.0 or factor < share * (1.0 - _SAME))
+        if not stands and (share == 1.0 or factor < share * (1.0 - SAME))
     }
     snaps = {own.number: own for own in path.snaps if own.factor < share and own.number not in fallen}
     drawn = len(path.factors)
@@ -333,7 +332,7 @@ def _failure(workspace: Workspace, each: Examined, count: int) -> FailureRecord 
         fallen = sorted(
             (factor / share, number)
             for number, factor in enumerate(path.factors)
-            if 0.0 < factor < min(share, 1.0) * (1.0 - _SAME)
+            if 0.0 < factor < min(share, 1.0) * (1.0 - SAME)
         )
         if not fallen:
             continue

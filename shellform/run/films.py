@@ -27,7 +27,7 @@ from shellform.structure.solve.loading import apply_load
 from shellform.written import make_folder
 
 _FRAMES = 24  # of a stage
-_SIZE = (960, 600)
+_SIZE = (960, 600)  # pixels
 
 
 def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = unheard) -> list[Path]:

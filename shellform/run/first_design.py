@@ -20,7 +20,7 @@ from dataclasses import replace
 from shellform.errors import InputError
 from shellform.gridshell.joints import turning_stress, usual_gap
 from shellform.gridshell.layers import layers_of
-from shellform.gridshell.loads import pressure
+from shellform.gridshell.loads import CONCRETE, pressure
 from shellform.net.edges import Edges, stand
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_edges import HEAVY, EdgeChoice, edge_choices
@@ -76,7 +76,7 @@ from shellform.surface.shape.target import Surface
 
 LEAST_THICKNESS = 0.015  # m: a first layer of sprayed concrete
 _FINER = 0.75  # from one spacing to the next
-_SPACINGS = 3
+_SPACINGS = 3  # tried, one after the other
 _STEPS = 4  # sections tried on one net
 _TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyond it no others are tried
 Say = Callable[[str], None]
@@ -228,7 +228,7 @@ class _Search:
     ) -> FirstDesign | None:
         """The design with the first of the `possible` sections, by rising stiffness, that stands, none of
         those that were `tried`; None where none does that is likely to."""
-        needed = NEEDED * pressure(thickness, 2500.0)
+        needed = NEEDED * pressure(thickness, CONCRETE)
         if hopeless(self.surface, spacing, possible[-1], needed):
             place = sharpest(placed.net)
             self._keep(Obstacle(Why.STABILITY, spacing, thickness, 0.0, possible[-1], placed, place))

@@ -31,10 +31,10 @@ from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.loading import apply_load
 from shellform.surface.shape.target import Surface
 
-ELEMENTS = 2
+ELEMENTS = 2  # a segment
 NEEDED = 1.5  # times the design load, which the perfect structure bears: drawn ones fall earlier
 ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path the design load then is
-DRAWN, SEED, ENLARGED = 40, 1, 1.25
+DRAWN, SEED, ENLARGED = 40, 1, 1.25  # structures, their seed, and how much larger their errors are
 STRESSED = 0.95  # of the strength, at the most, under the additional load
 PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond it takes no cables away
 _RELIEVED = 1.5  # with which power of the force in excess a section has to grow: stiffer strands bear more of the load

@@ -43,7 +43,7 @@ from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
-_EVALUATIONS, _POLISHED = 30, 10
+_EVALUATIONS, _POLISHED = 30, 10  # that the case proposed asks for: a first answer in minutes
 _SEARCH = 2 / 3  # of the work that a surface is worth: the search for a design of it as it is
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 

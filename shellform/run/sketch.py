@@ -25,7 +25,7 @@ from shellform.written import make_folder
 STAGES_OF_SKETCH = ("surface", "net", "initial", "optimise", "figures")
 PICTURE = "figures/sketch.png"
 _ELEMENTS = 2  # a segment
-_EVALUATIONS = 10
+_EVALUATIONS = 10  # of designs
 _SIZE = (1200, 750)  # pixels
 
 

@@ -25,7 +25,7 @@ from shellform.reliability.standing import sample
 
 DRAWN = 40  # structures of each size of rods
 _THICKER = 1.1  # times as thick as the ones before
-_SIZES = 8
+_SIZES = 8  # of rods tried at the most
 _EQUAL = 1e-9  # relative: stiffnesses that count as equal
 
 

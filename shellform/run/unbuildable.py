@@ -18,7 +18,7 @@ from shellform.arrays import Reals, Record
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.layers import layers_of
-from shellform.gridshell.loads import pressure
+from shellform.gridshell.loads import CONCRETE, pressure
 from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_trial import NEEDED, STRESSED
@@ -287,7 +287,7 @@ def _rounding(surface: Surface, failure: Obstacle, wish: DesignWish) -> float:
     """The radius, m, to which creases are to be rounded so that rods follow them that bear the load, but no
     more than nearly what three quarters of the surface keep; of flat pieces so far that they become a
     vault."""
-    needed = NEEDED * pressure(failure.thickness, 2500.0)
+    needed = NEEDED * pressure(failure.thickness, CONCRETE)
     if flat_between_creases(surface):
         return _ARCHED * float(surface.size[:2].max())
     wanted = radius_for(surface, failure.spacing, needed, wish)

@@ -38,7 +38,7 @@ from shellform.structure.solve.loading import advance
 from shellform.tables import Table, table_text
 
 STEP = 0.1  # of a stage
-_SMALLEST = 1.0 / 256.0
+_SMALLEST = 1.0 / 256.0  # of a stage: shorter steps lead on where nothing stands
 _SLACK = 1.5  # times its length in the target: a cable that isn't tightened yet
 _LEAST = 1e-4  # of a stage, which then has ten thousand steps
 _TRIAL = 25  # factorisations of one step of tightening

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import splu
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
 
-_ROUNDS = 200
+_ROUNDS = 200  # of the interior-point method, at the most
 _SETTLED = 1e-10  # complementarity and residual, of those at the start
 _CENTRING = 0.1  # of the present complementarity that the next step aims at
 _TO_EDGE = 0.99  # of the way to a bound that a step goes at the most

@@ -38,7 +38,7 @@ if TYPE_CHECKING:  # target.py loads numba, which a reader's process does withou
 FORMATS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep"}
 _DEFAULT_EDGES = 60.0  # along the longer plan extent
 _BUILT_EDGES = 90.0  # along the largest dimension of a builder script
-_SAMPLES = 33  # points on a curve that tell its extent
+_SAMPLES = 33  # points on each edge curve that a fitted surface passes through
 # of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
 _SEWN = 1e-6
 _FITTED = 1000  # about as many vertices a fitted surface passes through

@@ -29,7 +29,7 @@ from shellform.surface.readers.draft import require_mesh_size
 if TYPE_CHECKING:  # which load gmsh and numba
     from shellform.surface.shape.target import Surface
 
-_ROUNDS = 200
+_ROUNDS = 200  # in which heights and weights settle, at the most
 _SETTLED = 1e-10  # change of the heights in a round, of the rise
 _NEAREST = 1e-9  # weight of being uniform in a fit, of the mean diagonal
 _SINGULAR = 1e-12  # of the diagonal: a pivot below that is rounding

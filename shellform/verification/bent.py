@@ -20,7 +20,7 @@ from shellform.verification import exact
 from shellform.verification.compared import Comparison, rows
 from shellform.verification.models import CLAMP, PIN, chain, in_plane, line
 
-_ELEMENTS = 80
+_ELEMENTS = 80  # of a strip
 
 
 def _arched(chord: float, waves: float) -> State:

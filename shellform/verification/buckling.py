@@ -115,6 +115,7 @@ def lateral() -> Iterator[Comparison]:
 
 # Argyris' right-angle frame (mm, N): legs of 240, strip of 30 × 0.6 on edge, E = 71240, ν = 0.31.
 _YOUNG, _SHEAR = 71240.0, 71240.0 / 2.62
+# mm⁴: b³h/12 on edge and flat, b h³/3
 _STRONG, _WEAK, _TORSION = 0.6 * 30.0**3 / 12.0, 30.0 * 0.6**3 / 12.0, 30.0 * 0.6**3 / 3.0
 FRAME: Stiffness = (_YOUNG * 18.0, _SHEAR * _TORSION, _YOUNG * _STRONG, _YOUNG * _WEAK)
 FRAME_TIP = (1.08752, -0.68043)

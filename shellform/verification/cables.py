@@ -141,7 +141,7 @@ def force_densities() -> Iterator[Comparison]:
     )
 
 
-SIDE = 6
+SIDE = 6  # cells of a saddle net along each of its edges
 
 
 def hypar(side: int = SIDE) -> tuple[Network, Reals]:
@@ -189,7 +189,7 @@ def nets() -> Iterator[Comparison]:
     yield from rows("saddle net, half loaded", "energy minimised by SciPy, recomputed", 1e-6, numbers)
 
 
-HYPAR_NODES = (24, 17)
+HYPAR_NODES = (24, 17)  # whose heights are compared
 HYPAR = (0.00980161, -0.17225218, 672.82097, 4.0)
 """Displacements, largest tension and number of slack cables of the loaded net
 (tests/literature/test_references.py)."""

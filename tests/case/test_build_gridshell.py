@@ -21,6 +21,7 @@ from shellform.case.entries import (
 )
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Rod
+from shellform.gridshell.loads import CONCRETE
 from shellform.structure.elements.sections import Rectangle
 
 ROD = {"young": 40e9, "strength": 240e6}
@@ -113,6 +114,11 @@ def parts(monkeypatch):
     monkeypatch.setattr(module.loads, "rods", lambda net, section: one(5.0))
     monkeypatch.setattr(module, "weight", lambda net, edge: one(2.0))
     return found
+
+
+def test_concrete_of_a_case_is_as_dense_as_that_of_python_where_neither_says_so():
+    """The entries of a case load nothing of the package, so that they are read at once."""
+    assert ConcreteEntry(kind="concrete", thickness=0.05).density == CONCRETE
 
 
 WET = ConcreteEntry(

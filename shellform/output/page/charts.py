@@ -16,7 +16,7 @@ import numpy as np
 
 from shellform.records.words import number
 
-_WIDTH, _HEIGHT = 460, 270
+_WIDTH, _HEIGHT = 460, 270  # of a chart, in its own units, and its margins:
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52, 12, 12, 40
 _COLOURS = 6  # of style.css: --series-1 …
 

@@ -16,7 +16,7 @@ from shellform.output.pictures.images import web_picture
 from shellform.structure.elements.threads import side_by_side
 
 _WIDEST = 1600  # pixels
-_QUALITY = 82
+_QUALITY = 82  # of JPEG, of 100 at the most
 _PLAIN = {".svg": "image/svg+xml", ".gif": "image/gif", ".mp4": "video/mp4", ".webm": "video/webm"}
 KINDS = (".png", ".jpg", ".jpeg", ".webp", *_PLAIN)
 

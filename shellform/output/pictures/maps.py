@@ -24,7 +24,7 @@ from shellform.structure.answers.stability import modes
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 
-DEGREE = float(np.pi / 180.0)
+DEGREE = float(np.pi / 180.0)  # rad
 AMPLITUDE = 0.05  # of the size of a shell or model, at which a mode is drawn
 
 

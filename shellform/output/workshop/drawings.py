@@ -28,6 +28,7 @@ from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.schedules import Built
 from shellform.written import whole
 
+# 1 : each of them, as scales are usual on drawings
 SCALES = (1.0, 2.0, 2.5, 5.0, 10.0, 15.0, 20.0, 25.0, 50.0, 75.0, 100.0, 200.0, 500.0, 1000.0)
 PAPERS = {"A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 SMALLEST = 1.6  # mm, of letters on paper

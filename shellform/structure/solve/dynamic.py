@@ -39,7 +39,7 @@ from shellform.structure.solve.residual import (
 FIRST = 1.0  # time step to begin with, in natural times of the stiffest motions
 DAMPING = 0.0  # c, 1 over time; kinetic damping alone needs none
 _GROWTH, _CUT = 1.5, 0.5  # of the time step after a good and a failed step
-_SHORTEST = 1e-9
+_SHORTEST = 1e-9  # of the first time step: shorter ones lead nowhere
 
 
 def dynamic(

@@ -39,6 +39,7 @@ _BLAS = 240_000_000
 if cholmod is not None and not has_room(_BLAS):
     cholmod = None
 
+COLUMNS = 256  # solved for at once where there are thousands: 100 MB at 50,000 degrees of freedom
 _SUPERNODAL, _SIMPLICIAL = 2, 0  # values of CHOLMOD's option: L L' by blocks, L D L' column by column
 _CHOLMOD = threading.Lock()  # held while the option must stay as it was set
 

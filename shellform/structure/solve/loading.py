@@ -34,8 +34,8 @@ from shellform.structure.solve.drive import Drive, carried, forces, moved_on
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium
 from shellform.structure.solve.leaps import Watch
 
-STEP = 0.25
-SMALLEST = 1.0 / 64.0
+STEP = 0.25  # of the whole, the first increment
+SMALLEST = 1.0 / 64.0  # of the whole: shorter increments count as the end of the branch
 _PATIENCE = 25  # factorisations of one increment; on the branch five or six are enough
 _REGROWTH = 2  # good increments before one is doubled again
 

@@ -34,9 +34,9 @@ from shellform.arrays import Indices, Reals
 from shellform.structure.elements.threads import cores
 from shellform.structure.solve.addresses import has_room
 
-_POSITIVE_DEFINITE, _INDEFINITE = 2, -2
-_ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
-_NOT_DEFINITE, _FULL = -4, -2
+_POSITIVE_DEFINITE, _INDEFINITE = 2, -2  # mtype: real, symmetric
+_ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1  # phase
+_NOT_DEFINITE, _FULL = -4, -2  # error: a pivot that is zero or negative, no memory
 _DISSECTION_FROM = 300_000  # degrees of freedom
 _TWO_THREADS_FROM = 200_000  # degrees of freedom
 _TWO_LEVELS_UP_TO = 20_000  # degrees of freedom

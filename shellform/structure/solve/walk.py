@@ -28,7 +28,7 @@ from shellform.structure.solve.outlook import Outlook, View
 from shellform.structure.solve.residual import STAGNANT, ResidualNorm, Turning, held, overturned
 
 _ITERATIONS = 12  # of Newton in one step
-_BISECTIONS = 30
+_BISECTIONS = 30  # of a step, towards an event: 1e-9 of it
 _LOCATED = 1e-7  # of the factor, as near as an event is located
 
 

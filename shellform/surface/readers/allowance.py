@@ -20,7 +20,7 @@ _MEMORY_A_BYTE = 30.0  # of the file
 _MEMORY_A_TRIANGLE = 2000.0  # bytes
 _SECONDS = 30.0  # of a processor, for any file: sound ones take a few, on slow machines a few times that
 _SECONDS_A_BYTE = 3e-5  # of the file
-_SECONDS_A_TRIANGLE = 5e-4
+_SECONDS_A_TRIANGLE = 5e-4  # … more, once it is known how many there are
 
 
 def allow_file(file: Path) -> None:

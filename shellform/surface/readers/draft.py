@@ -15,9 +15,9 @@ from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many, require_number
 
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
-MOST_TRIANGLES = 2_000_000
+MOST_TRIANGLES = 2_000_000  # of one surface: they take 4 GB (allowance.py)
 MOST_BYTES = 512 * 1024**2  # of one file
-_NAMES_TOLD = 12
+_NAMES_TOLD = 12  # of layers and objects, in one message
 _TRIANGLES = 2.5  # in a square of the mesh size, with what a surface's rise adds to its plan
 _ENTRIES = ("surface.layer", "surface.object")
 

@@ -20,11 +20,10 @@ from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.mend import noted
 from shellform.surface.readers.seams import open_edges
 from shellform.surface.shape.plate import bent_heights
-from shellform.surface.shape.target import closed_loops, make_surface
+from shellform.surface.shape.target import ON_GROUND, closed_loops, make_surface
 
-_ON_GROUND = 0.02  # of the rise: an edge lower than that stands on the ground
 _DESCENT = 1.0  # mean slope of a fill down to the ground
-_STEEPEST = 3.0
+_STEEPEST = 3.0  # mean slope of it at the most
 _FLATTEST = 0.7  # mean slope of a fill whose footprint goes further out
 _WIDEST = np.pi / 4  # angle to its chord at which a footprint leaves a foot
 _BLEND = 0.1  # of the span: how softly a footprint goes over from the one rule to the other
@@ -56,7 +55,7 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
     outer = loops[int(np.argmax(outline))]
     level = float(draft.points[outer, 2].min()) if ground is None else ground
     rise = float(draft.points[:, 2].max()) - level
-    low = draft.points[:, 2] <= level + _ON_GROUND * rise
+    low = draft.points[:, 2] <= level + ON_GROUND * rise
     own, closed = len(draft.points), replace(draft, normals=normals)
     holes = [loop for loop in loops if loop is not outer and not low[loop].any()]
     standing = len(loops) - 1 - len(holes)

@@ -35,8 +35,8 @@ from shellform.surface.readers.draft import (
 
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_JSON, _BIN = 0x4E4F534A, 0x004E4942
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_JSON, _BIN = 0x4E4F534A, 0x004E4942  # kinds of chunks of a .glb
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of primitives
 _TOLD = 80  # characters of an address that are quoted
 _VERTICES, _ELEMENTS = 34962, 34963  # what a buffer view is for
 

@@ -24,7 +24,7 @@ from shellform.surface.readers.sides import shared_edges, side_of
 _SAME = 1e-8  # of the size: vertices nearer than that are one
 _FLAT = 1e-9  # of the squared size: a surface smaller than that has no area
 _FURTHEST = 1e9  # m from the origin
-_PIECES_TOLD = 5
+_PIECES_TOLD = 5  # the largest ones, in one message
 _PARTED = 1e-6  # of the size: how far the two sides of a parted vertex move into their faces
 
 

@@ -34,7 +34,7 @@ FORMATS = {
     "off": "OFF", "gltf": "glTF", "vtk": "VTK", "vtu": "VTU", "vtp": "VTP", "msh": "MSH",
     "compas": "COMPAS JSON",
 }  # fmt: skip
-_HEAD = 65536
+_HEAD = 65536  # bytes, by which a file's format is told
 _UPRIGHT = 0.25  # plan over area, below which a shell is likely to lie on its side
 _STATED_UP = ("gltf",)  # formats that say which axis is vertical
 _TURNED = "its {} axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"

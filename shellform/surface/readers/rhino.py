@@ -35,7 +35,7 @@ _METRES = {
 }  # fmt: skip
 _OURS = UUID("5c6f4b1e-6b0e-5a53-9f0d-6a1f8b7d2c11")  # under which what is written has its identifiers
 _DEEPEST = 16  # blocks within blocks
-_SUBDIVISIONS = 3
+_SUBDIVISIONS = 3  # of a SubD, each of which quarters its faces
 _ON_EDGE = 1e-4  # of the size: a trim nearer to the patch's own edge than that doesn't cut it
 _SAMPLES = 161  # along each side, whose chords are then nearer to it than that
 

@@ -13,7 +13,8 @@ import struct
 import zlib
 from collections.abc import Iterator
 
-_HEADING = 32
+_HEADING = 32  # bytes, before the first chunk
+# codes of chunks
 _PROPERTIES, _PATH, _HISTORY, _END = 0x10000014, 0x20008027, 0x20008021, 0x7FFF
 _SHORT = 0x80000000  # of codes: the number after it is a value, nothing follows
 _DATE = struct.Struct("<8i")

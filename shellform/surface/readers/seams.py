@@ -25,7 +25,7 @@ _MOST_GAP = 1e-3  # of the size
 _INSIDE = 1e-3  # of an edge's length: nearer to its ends than that is no T-junction
 _SLIVER = 0.01  # height over longest side
 _SHORT = 0.05  # shortest over longest side, below which a sliver loses its short side
-_ROUNDS = 8
+_ROUNDS = 8  # of closing gaps and of removing slivers, each at the most
 
 
 def sewn(draft: Draft, size: float) -> Draft:

@@ -14,8 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError
 
-_SHARP = np.cos(np.deg2rad(35.0))
-_ALSO = 0.25
+_SHARP = np.cos(np.deg2rad(35.0))  # of the angle between normals: beyond, an edge sets two faces apart
+_ALSO = 0.25  # of the largest face's area in plan: others as large belong to that side too
 _BOTH = 0.75  # of a face's area that has to point to its side
 
 

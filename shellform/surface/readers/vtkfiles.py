@@ -16,7 +16,7 @@ from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 
 _POLYGONS = (5, 7, 9)  # VTK_TRIANGLE, VTK_POLYGON, VTK_QUAD
 _CURVED = {22: 3, 34: 3, 23: 4, 28: 4}  # quadratic triangles and quadrilaterals: their corners come first
-_STRIP = 6
+_STRIP = 6  # VTK_TRIANGLE_STRIP
 
 
 def read_vtk(file: Path, choice: Choice, kind: str) -> Draft:

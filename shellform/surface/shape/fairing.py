@@ -42,7 +42,7 @@ import scipy.sparse as sp
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, NotConverged, require_number
 from shellform.structure.solve.factorisation import Factor, Symmetric
-from shellform.surface.shape.target import Surface, make_surface, rough_normals, vertex_areas
+from shellform.surface.shape.target import ON_GROUND, Surface, make_surface, rough_normals, vertex_areas
 
 _MESH = 0.3  # of R: edges that aren't longer show its curvature
 _MOST = 30_000  # vertices of the refined mesh
@@ -54,7 +54,6 @@ _STAGED = 10_000  # vertices: of more, stages take minutes
 _LOST = 0.05  # of a stage's radius, that is left at one place: no further stage mends that
 _MARGIN = 0.96  # of the cap, at which forms are capped
 _HEAVY = 10.0  # times their area: vertices on the ground
-_GROUND = 0.02  # of the rise: edges within it of the lowest stand on the ground
 _RELAXED = 1.6  # over-relaxation
 
 
@@ -313,7 +312,7 @@ def _on_ground(surface: Surface) -> Flags:
     level = surface.vertices[:, 2]
     result = np.zeros(len(level), dtype=bool)
     result[np.concatenate(surface.boundary)] = True
-    return result & (level <= level.min() + _GROUND * np.ptp(level))
+    return result & (level <= level.min() + ON_GROUND * np.ptp(level))
 
 
 def _refined(surface: Surface, longest: float) -> Surface:

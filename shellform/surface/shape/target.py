@@ -20,6 +20,7 @@ from shellform.errors import InputError, how_many
 from shellform.surface.shape.jets import jets
 
 _SAME = 1e-9  # of the size: vertices nearer than that are one
+ON_GROUND = 0.02  # of the rise: an edge within it of the lowest level stands on the ground
 _FLAT = 1e-12  # of the squared size: triangles smaller than that have no area
 
 
