@@ -132,6 +132,40 @@ def test_of_several_compas_meshes_one_has_to_be_named(tmp_path):
     np.testing.assert_allclose(read_surface(tmp_path / "two.json", name="big").size, np.array(SIZE) * 2)
 
 
+@pytest.mark.parametrize(
+    ("tree", "names"),
+    [
+        (lambda one, other: [one, other], "mesh 1, mesh 2"),
+        (lambda one, other: {"roof": one, "site": other}, "roof, site"),
+        (
+            lambda one, other: [
+                {**one, "attributes": {"name": "roof"}},
+                {**other, "attributes": {"name": "roof"}},
+            ],
+            "roof 1, roof 2",
+        ),
+    ],
+)
+def test_compas_meshes_without_a_name_or_of_the_same_are_told_apart_and_chosen(tmp_path, tree, names):
+    file = tmp_path / "two.json"
+    file.write_text(
+        json.dumps(tree(compas_mesh(POINTS, QUADS)["data"], compas_mesh(2 * POINTS, QUADS)["data"]))
+    )
+    with pytest.raises(InputError, match=f"2 meshes.*among {names}"):
+        read_surface(file)
+    for name, times in zip(names.split(", "), (1, 2), strict=True):
+        np.testing.assert_allclose(read_surface(file, name=name).size, np.array(SIZE) * times)
+
+
+def test_a_force_diagram_is_no_shell_unless_it_is_asked_for(tmp_path):
+    form = {**compas_mesh(POINTS, QUADS)["data"], "attributes": {"name": "FormDiagram"}}
+    force = {**compas_mesh(2 * POINTS, QUADS)["data"], "attributes": {"name": "ForceDiagram"}}
+    (tmp_path / "a.json").write_text(json.dumps({"settings": {}, "form": form, "force": force}))
+    same_shell(read_surface(tmp_path / "a.json"))
+    asked = read_surface(tmp_path / "a.json", name="ForceDiagram")
+    np.testing.assert_allclose(asked.size, np.array(SIZE) * 2)
+
+
 def test_what_has_vertices_and_no_faces_in_a_compas_file_is_no_mesh(tmp_path):
     """A form diagram's network beside the mesh, as sessions hold them."""
     network = {"vertex": {"0": {"x": 0.0}, "1": {"x": 1.0}}, "edge": {"0": {"1": {}}}}
@@ -212,9 +246,10 @@ def test_a_network_that_encloses_nothing_holds_no_faces(tmp_path):
         read_surface(tmp_path / "a.json")
 
 
-def test_faces_without_load_in_a_compas_mesh_are_openings(tmp_path):
+@pytest.mark.parametrize("loaded", ["_is_loaded", "is_loaded"])
+def test_faces_without_load_in_a_compas_mesh_are_openings(tmp_path, loaded):
     mesh = compas_mesh(POINTS, QUADS)
-    mesh["data"]["facedata"] = {"44": {"_is_loaded": False}}
+    mesh["data"]["facedata"] = {"44": {loaded: False}}
     (tmp_path / "a.json").write_text(json.dumps(mesh))
     surface = read_surface(tmp_path / "a.json")
     assert surface.holes == 1
@@ -583,7 +618,8 @@ def test_ply_files_of_other_libraries_are_read(tmp_path):
     plyfile.PlyData(elements, text=True).write(tmp_path / "plyfile.ply")
     text = (tmp_path / "text.ply").read_bytes().replace(b"\n", b"\r\n")
     (tmp_path / "windows.ply").write_bytes(text)
-    for name in ("binary", "text", "vtk", "plyfile", "windows"):
+    (tmp_path / "capitals.ply").write_bytes(b"PLY" + (tmp_path / "text.ply").read_bytes()[3:])
+    for name in ("binary", "text", "vtk", "plyfile", "windows", "capitals"):
         same_shell(read_surface(tmp_path / f"{name}.ply"), atol=1e-5)
 
 

@@ -1,8 +1,9 @@
 """COMPAS meshes in JSON, as RHINOVault's successors and other COMPAS programs write them.
 
 A file is one mesh, or a session with a scene of several; each is found by its `vertex` and `face` tables, in
-the layouts of COMPAS 1 (`dva`, faces as lists) and 2 (`default_vertex_attributes`, `facedata`). Of a
-RHINOVault session the `ThrustDiagram` is the shell; its faces marked as without load are openings. A file
+the layouts of COMPAS 0 and 1 (`dva`, faces as lists) and 2 (`default_vertex_attributes`, `facedata`). Of a
+RHINOVault session the `ThrustDiagram` is the shell, and a `ForceDiagram`, whose coordinates are forces, is
+none; faces marked as without load are openings. A file
 without a mesh may hold a network (`node` and `edge` tables, as force density programs write): the faces
 between its lines are the shell.
 """
@@ -10,6 +11,7 @@ between its lines are the shell.
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
@@ -22,7 +24,8 @@ from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 from shellform.surface.readers.network_faces import faces_in_plan
 
-_SHELL = "ThrustDiagram"
+_SHELL, _FORCES = "ThrustDiagram", "ForceDiagram"
+_LOADED = ("_is_loaded", "is_loaded")  # of a face, as later and earlier versions call it
 
 
 def read_compas(file: Path, choice: Choice) -> Draft:
@@ -46,7 +49,9 @@ def read_compas(file: Path, choice: Choice) -> Draft:
     named = [(name, table) for name, table in found if name == _SHELL]
     if not choice.name and not choice.layer and named:
         found = named[-1:]
-    elif not choice.name and len(found) > 1:
+    else:
+        found = _told_apart([each for each in found if choice.name or each[0] != _FORCES] or found)
+    if not choice.name and len(found) > 1:
         raise InputError(
             f"holds {len(found)} {'networks' if networks else 'meshes'}",
             where=str(file),
@@ -87,12 +92,24 @@ def _tables(data: Any, name: str, points: str, joins: str) -> Iterator[tuple[str
             yield from _tables(each, name, points, joins)
     elif isinstance(data, dict):
         kind = str(data.get("dtype") or data.get("datatype") or "").replace("/", ".").rsplit(".", 1)[-1]
-        called = str(data.get("name") or kind or name)
+        stated = data.get("attributes")
+        called = str(data.get("name") or (isinstance(stated, dict) and stated.get("name")) or kind or name)
         if isinstance(data.get(points), dict) and isinstance(data.get(joins), dict):
             yield called, data
         else:
-            for each in data.values():
-                yield from _tables(each, called, points, joins)
+            for key, each in data.items():
+                yield from _tables(each, called or key, points, joins)
+
+
+def _told_apart(found: list[tuple[str, dict[str, Any]]]) -> list[tuple[str, dict[str, Any]]]:
+    """The objects by names of which none is empty and none there twice, where there are several."""
+    times = Counter(name for name, _ in found)
+    if len(found) < 2 or (max(times.values()) < 2 and "" not in times):
+        return found
+    return [
+        (name if name and times[name] < 2 else f"{name or 'mesh'} {k}", table)
+        for k, (name, table) in enumerate(found, 1)
+    ]
 
 
 def _part(name: str, table: dict[str, Any]) -> tuple[MeshObject, int]:
@@ -106,7 +123,8 @@ def _part(name: str, table: dict[str, Any]) -> tuple[MeshObject, int]:
     for key, face in table["face"].items():
         if face is None:
             continue
-        if not ({**whole, **(shared.get(key) or {})}).get("_is_loaded", True):
+        told = {**whole, **(shared.get(key) or {})}
+        if not all(told.get(each, True) for each in _LOADED):
             openings += 1
             continue
         corners = [number[str(each)] for each in face]

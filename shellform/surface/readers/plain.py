@@ -58,15 +58,18 @@ def read_off(file: Path, choice: Choice) -> Draft:
         raise InputError("ends after its first line", where=str(file), remedy=_ANEW)
     head = words[0][1][1:] or words[1][1]
     rows = words[1 if words[0][1][1:] else 2 :]
-    last = 1
+    last = words[0 if words[0][1][1:] else 1][0]
     try:
         points, faces = int(head[0]), int(head[1])
-        if len(rows) < points + faces:
-            raise InputError(
-                f"ends after {len(rows)} of {points + faces} vertices and faces",
-                where=str(file),
-                remedy=_ANEW,
-            )
+    except (ValueError, IndexError) as error:
+        raise _bad_line(file, last, "") from error
+    if len(rows) < points + faces:
+        raise InputError(
+            f"ends after {len(rows)} of {points + faces} vertices and faces",
+            where=str(file),
+            remedy=_ANEW,
+        )
+    try:
         place: list[list[float]] = []
         blocks: dict[int, list[list[int]]] = {}
         for at, row in rows[: points + faces]:

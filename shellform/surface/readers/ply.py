@@ -8,6 +8,7 @@ over.
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,9 @@ _ANEW = "Check that the file is whole and that its ending fits its content."
 def read_ply(file: Path, choice: Choice) -> Draft:
     """The polygons of a file. Raises InputError for what can't be used."""
     try:
-        elements = {element.name: element for element in plyfile.PlyData.read(str(file), mmap=False).elements}
+        data = file.read_bytes()
+        data = data[:3].lower() + data[3:]  # some programs write the first word in capitals
+        elements = {each.name: each for each in plyfile.PlyData.read(BytesIO(data), mmap=False).elements}
     except MemoryError:
         raise
     except Exception as error:  # plyfile raises NumPy's errors besides its own where a file is damaged
