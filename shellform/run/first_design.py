@@ -41,6 +41,7 @@ from shellform.run.next_trial import (
     bears_most,
     edges_may_help,
     fails_by,
+    narrowed,
     relieved,
     stiffer_rods,
     thinned,
@@ -78,6 +79,7 @@ LEAST_THICKNESS = 0.015  # m: a first layer of sprayed concrete
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3  # tried, one after the other
 _STEPS = 4  # sections tried on one net
+_NARROWED = 6  # where less stiff ones fell, deeper ones broke, and some lie between
 _TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyond it no others are tried
 Say = Callable[[str], None]
 
@@ -240,8 +242,9 @@ class _Search:
             at = after(placed.net, possible, tried)
         else:
             tried, at = {}, first_choice(placed.net, self.surface, spacing, possible, needed)
-        while at not in tried and len(tried) < _STEPS:
-            if tried and self.allowance.over:
+        while at not in tried:
+            ended = len(tried) >= (_NARROWED if narrowed(possible, tried) else _STEPS)
+            if tried and (ended or self.allowance.over):
                 break
             result = self._stands(placed, possible[at], spacing, thickness)
             if isinstance(result, FirstDesign):

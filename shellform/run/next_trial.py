@@ -8,7 +8,15 @@ from typing import TypeVar
 
 from shellform.net.net import Net
 from shellform.run.first_trial import NEEDED, PULLED, STRESSED, FirstParts, Followed
-from shellform.run.sizes import Placed, RodChoice, load_borne, next_choice, next_thinner, whole_mm
+from shellform.run.sizes import (
+    Placed,
+    RodChoice,
+    bent_to,
+    load_borne,
+    next_choice,
+    next_thinner,
+    whole_mm,
+)
 from shellform.run.unbuildable import Obstacle, Why
 
 EASES = 1.4  # times the load that heavier edge beams have to let it bear, or the stress that they have to spare it
@@ -18,6 +26,7 @@ AIMED = 0.92  # of what rods may be stressed to, for which concrete is thinned
 _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help
 _EASED = 5  # times that cables are eased, by less prestrain or thicker strands
 _STRONGER = 3  # times that strands are made stronger for rods that break
+_FALLS = (Why.STABILITY, Why.SCATTER)
 _SPARED = 0.95  # of the stress before, at the most, for which cables are made slacker once more
 Stands = TypeVar("Stands")
 
@@ -59,7 +68,7 @@ def relieved(parts: FirstParts, follow: Callable[[FirstParts], Followed]) -> tup
 
 def edges_may_help(failure: Obstacle) -> bool:
     """Whether stronger edge beams may."""
-    falls = failure.why in (Why.STABILITY, Why.SCATTER)
+    falls = failure.why in _FALLS
     return failure.why is Why.EDGES or (falls and failure.nearness(NEEDED) >= _NEAR * NEEDED)
 
 
@@ -72,18 +81,55 @@ def next_section(net: Net, possible: Sequence[RodChoice], at: int, failure: Obst
 
 
 def after(net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]) -> int:
-    """The section to try after the last of those `tried`; one of them where there is none."""
+    """The section to try after the last of those `tried`; one of them where there is none.
+
+    What is less stiff than a section that fell would fall too. So where what a failure asks for was tried
+    before, or fell, and rods broke under the load, it is one between those: stiffer than all that fell, and
+    less deep than what broke least, by what its stress asks for, or by half the way there.
+    """
     at, failure = list(tried.items())[-1]
     found = next_section(net, possible, at, failure)
-    if found in tried and failure.why is Why.STRENGTH:  # stiffer ones only bend harder
-        least = min(tried, key=lambda each: tried[each].stress)
-        return possible.index(thinner_rods(possible, possible[least], tried[least]))
-    return found
+    fallen, least = _stiffest_fallen(tried), _least_broken(tried)
+    if least is None or (found not in tried and found > fallen):
+        return found
+    thinner = possible.index(thinner_rods(possible, possible[least], tried[least]))
+    if failure.why is Why.STRENGTH and thinner > fallen:
+        return thinner
+    between = _between(possible, tried)
+    return between[len(between) // 2] if between else at
+
+
+def narrowed(possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]) -> bool:
+    """Whether less stiff sections of those `tried` fell and deeper ones broke, and others lie between: one of
+    these is likelier to stand than any on a finer net."""
+    return _stiffest_fallen(tried) >= 0 and bool(_between(possible, tried))
+
+
+def _between(possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]) -> list[int]:
+    """The sections stiffer than all that fell and less deep than what broke least; none where none broke."""
+    least = _least_broken(tried)
+    if least is None:
+        return []
+    deep = bent_to(possible[least])
+    stiffer = range(_stiffest_fallen(tried) + 1, least)
+    return [k for k in stiffer if k not in tried and bent_to(possible[k]) < deep]
+
+
+def _stiffest_fallen(tried: Mapping[int, Obstacle]) -> int:
+    """-1 where none fell."""
+    return max((k for k, each in tried.items() if each.why in _FALLS), default=-1)
+
+
+def _least_broken(tried: Mapping[int, Obstacle]) -> int | None:
+    """The section stressed least of those that broke, by which others are judged: stiffer ones only bend
+    harder."""
+    broken = [k for k, each in tried.items() if each.why is Why.STRENGTH]
+    return min(broken, key=lambda each: tried[each].stress, default=None)
 
 
 def thinner_rods(possible: Sequence[RodChoice], choice: RodChoice, failure: Obstacle) -> RodChoice:
-    """Of the `possible` sections the stiffest that is so much less deep than the `choice` that bending
-    stresses it no more than it may be; the `choice` itself where there is none."""
+    """Of the `possible` sections the stiffest that is so much less deep than the `choice`, for its material,
+    that bending stresses it no more than it may be; the `choice` itself where there is none."""
     if choice not in possible:
         return choice
     share = AIMED * STRESSED / failure.stress

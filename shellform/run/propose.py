@@ -39,6 +39,7 @@ from shellform.run.first_trial import (
 )
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import OF_SPAN, THICKNESS, DesignWish, RodChoice, may_come_off, usual_thickness
+from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
@@ -180,6 +181,7 @@ def _written(
         "stands": f"up to {design.tried.factor:.2f} × its load or more; {design.standing} of {design.drawn} structures under 1.2 × its load with {_BUILT}",
         **({"shape": far} if far else {}),
         "edges": edges,
+        **({"edge beams": _edge_beams_told(design)} if design.placed.net.edges else {}),
         "case": str(asked.output),
     }
 
@@ -303,6 +305,12 @@ composite = {section.composite!r}      # how far they act together: 1 as if glue
     return f"""\
 catalogue = "{TUBES}"
 section = "{_named(label(section))}"    # {told}rolled to the edge's curve; or rods in a bundle, width and height, radius and wall"""
+
+
+def _edge_beams_told(design: FirstDesign) -> str:
+    """What they are, and what they weigh."""
+    edge = design.parts.edge
+    return f"{edge.label}, {mass_per_length(edge.section):.3g} kg/m"
 
 
 def _edges_came_to(design: FirstDesign) -> str:

@@ -278,11 +278,11 @@ def next_choice(
 
 
 def next_thinner(possible: Sequence[RodChoice], at: int, share: float) -> int:
-    """The stiffest of the sections less stiff than that `at` that is at most a `share` as deep, for where
-    what is added to the stress of bending into the net is more bending, at supports and ends of rods, and
-    grows with the depth; `at` where there is none."""
-    deep = share * max(possible[at].section.fibres)
-    return next((k for k in range(at - 1, -1, -1) if max(possible[k].section.fibres) <= deep), at)
+    """The stiffest of the sections less stiff than that `at` that bending stresses at most a `share` as much
+    (of one material: that is a share as deep), for where what is added to the stress of bending into the net
+    is more bending, at supports and ends of rods, and grows with the depth; `at` where there is none."""
+    least = share * bent_to(possible[at])
+    return next((k for k in range(at - 1, -1, -1) if bent_to(possible[k]) <= least), at)
 
 
 def load_borne(net: Net, choice: RodChoice, stress: float, most: float) -> float:
@@ -328,7 +328,7 @@ def radius_for(surface: Surface, spacing: float, needed: float, wish: DesignWish
     fit = [each for n in layers for each in wished(wish.rod, n) if least_spacing(each) <= spacing]
     borne = {each: _without_creases(surface, spacing, each) for each in fit}
     for ample in (_AMPLE, 0.5 * _AMPLE, 0.25 * _AMPLE):  # the estimate is rough
-        enough = [_radius(each) / _BENT for each in fit if borne[each] >= ample * needed]
+        enough = [bent_to(each) / _BENT for each in fit if borne[each] >= ample * needed]
         if enough:
             return min(enough)
     return 0.0
@@ -347,7 +347,7 @@ def _without_creases(surface: Surface, spacing: float, choice: RodChoice) -> flo
     return _BUCKLING * math.sqrt(across * shear) * 0.5 * curvature_usual(surface) ** 2
 
 
-def _radius(choice: RodChoice) -> float:
+def bent_to(choice: RodChoice) -> float:
     """To which a rod can be bent until it breaks, m: equation (1)."""
     material = choice.section.material
     return material.young * max(choice.section.fibres) / material.strength

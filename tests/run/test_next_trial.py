@@ -86,6 +86,39 @@ def test_what_was_tried_before_gives_way_to_less_deep_rods_where_rods_break(monk
     assert next_trial.after("net", SOME, tried) == then
 
 
+ROW = [
+    RodChoice("some", sf.Rod.round(young=40e9, radius=radius, strength=255e6, density=2000.0).section)
+    for radius in (0.005, 0.006, 0.007, 0.008, 0.009, 0.010, 0.0125)
+]
+
+
+@pytest.mark.parametrize(
+    ("tried", "found", "then"),
+    [
+        # the one that broke was stressed to 1.16 of its strength: 0.75 of its depth is left
+        ({2: (Why.STABILITY, 0.73), 6: (Why.STRENGTH, 1.16)}, 6, 4),
+        ({2: (Why.SCATTER, 0.73), 6: (Why.STRENGTH, 1.16)}, 0, 4),  # thinner than the one that fell
+        # stressed to 1.6, and what is so much less deep fell: half the way from the one that fell
+        ({4: (Why.STABILITY, 0.73), 6: (Why.STRENGTH, 1.6)}, 6, 5),
+        ({2: (Why.STABILITY, 0.73), 6: (Why.STRENGTH, 1.6)}, 6, 4),
+        # what a fall asks for broke before
+        ({6: (Why.STRENGTH, 1.16), 4: (Why.STABILITY, 0.9)}, 6, 5),
+        ({6: (Why.STRENGTH, 1.16), 5: (Why.STABILITY, 0.9)}, 6, 5),  # nothing is between them: the end
+        ({5: (Why.STABILITY, 0.9), 6: (Why.STRENGTH, 1.16)}, 6, 6),
+    ],
+)
+def test_between_sections_that_fell_and_those_that_broke_others_are_tried(monkeypatch, tried, found, then):
+    monkeypatch.setattr(next_trial, "next_section", lambda *_: found)
+    failures = {k: failed(why, stress=stress) for k, (why, stress) in tried.items()}
+    assert next_trial.after("net", ROW, failures) == then
+    assert next_trial.narrowed(ROW, failures) == (then not in tried)
+
+
+@pytest.mark.parametrize("tried", [{2: Why.STABILITY}, {6: Why.STRENGTH}, {2: Why.EDGES, 6: Why.STRENGTH}])
+def test_sections_are_narrowed_down_only_between_one_that_fell_and_one_that_broke(tried):
+    assert not next_trial.narrowed(ROW, {k: failed(why) for k, why in tried.items()})
+
+
 @pytest.mark.parametrize(
     ("why", "factor", "borne", "share"),
     [

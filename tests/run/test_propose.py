@@ -27,7 +27,7 @@ from shellform.run.first_edges import edge_choices
 from shellform.run.first_net import Allowance
 from shellform.run.first_refusal import Refused, WayOut
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts, Followed
-from shellform.run.propose import _edge_beams, _optimise, propose_case
+from shellform.run.propose import _edge_beams, _edge_beams_told, _optimise, propose_case
 from shellform.run.sizes import (
     LEAST_PRESTRAIN,
     STRAINED,
@@ -368,6 +368,16 @@ def test_a_proposed_case_tells_how_far_its_edge_beams_are_off_where_it_has_any(l
         )
         assert key in tomllib.loads(entry)
         assert ("stressed to 31% of their strength, up to 87 mm off under 1.2 ×" in entry) is told
+
+
+def test_what_edge_beams_are_is_told_with_what_they_weigh():
+    """Nineteen rods of 32 mm and 2,000 kg/m³; a tube of 7,850 kg/m³."""
+    rods = wished("gfrp_rods/32 mm")[0]
+    bundle, tube = (
+        _edge_beams_told(SimpleNamespace(parts=SimpleNamespace(edge=edge))) for edge in edge_choices(rods)[:2]
+    )
+    assert bundle == f"19 rods, {19 * np.pi * 0.016**2 * 2000:.3g} kg/m"
+    assert re.fullmatch(r"⌀ [\d.]+ × [\d.]+ mm, [\d.]+ kg/m", tube)
 
 
 @pytest.mark.parametrize(

@@ -227,6 +227,9 @@ def test_the_stiffest_section_that_is_so_much_less_deep_comes_where_bending_brea
     assert sizes.next_thinner(some, 2, 1.0) == 0
     assert sizes.next_thinner(some, 3, 0.5) == 0
     assert sizes.next_thinner(some, 3, 0.3) == 3
+    steel = sf.Rod.round(young=210e9, radius=0.006, strength=355e6, density=7850.0).section
+    some[2] = sizes.RodChoice("steel", steel)
+    assert sizes.next_thinner(some, 3, 0.8) == 1, "steel of 6 mm is bent to a radius of 3.5 m at the least"
 
 
 def test_the_share_of_a_load_that_a_section_bears_is_what_bending_leaves_of_its_strength(known):
