@@ -32,6 +32,9 @@ from shellform.surface.shape.target import Surface, curvature, vertex_areas, wid
 SHOWN = 0.95  # of the surface's area keeps the curvature by which cells are sized
 _USUALLY = 0.75  # of its area: what is curved more may be creases, which bear nothing
 _HOPELESS = 0.03  # of the load needed, by the estimate: rods of a tenth of the depth that is needed
+_BUCKLES = (
+    0.3  # of the load needed, at which rods buckle between their joints: a sphere's thrust is a rough guess
+)
 _BY_RADIUS = 3.0  # cells across a radius of curvature
 _CROSSINGS = 260.0  # to begin with
 MOST_CROSSINGS = 1100  # beyond which a first design takes minutes
@@ -335,9 +338,18 @@ def radius_for(surface: Surface, spacing: float, needed: float, wish: DesignWish
 
 
 def hopeless(surface: Surface, spacing: float, choice: RodChoice, needed: float) -> bool:
-    """Whether rods are so thin that the surface, curved as usual, would by the estimate buckle far below
-    `needed`, N/m²."""
-    return _without_creases(surface, spacing, choice) < _HOPELESS * needed
+    """Whether rods are so thin that by the estimate the surface, curved as usual, would buckle far below
+    `needed`, N/m², or they themselves between two joints."""
+    if _without_creases(surface, spacing, choice) < _HOPELESS * needed:
+        return True
+    return _between_joints(surface, spacing, choice) < _BUCKLES * needed
+
+
+def _between_joints(surface: Surface, spacing: float, choice: RodChoice) -> float:
+    """The load, N/m², under which rods buckle between two joints, at the most: these clamp them (Euler), and
+    each rod has the thrust of a sphere, q R / 2 times the spacing, R no more than the span."""
+    radius = min(1.0 / max(curvature_usual(surface), 1e-12), width(surface))
+    return 4.0 * math.pi**2 * choice.bending / spacing**2 / (0.5 * radius * spacing)
 
 
 def _without_creases(surface: Surface, spacing: float, choice: RodChoice) -> float:

@@ -277,12 +277,28 @@ def test_the_radius_is_that_of_the_thinnest_rods_that_are_likely_to_bear_the_loa
 
 def test_without_its_creases_a_surface_buckles_as_if_it_were_curved_as_usual_in_one_direction(monkeypatch):
     monkeypatch.setattr(sizes, "curvature_usual", lambda _: 0.2)
+    monkeypatch.setattr(sizes, "width", lambda _: 20.0)
     own = section(0.01, bending=50.0)
     root = math.sqrt((50.0 / 0.5) * (Rope(0.003).stiffness / (math.sqrt(2.0) * 0.5)))
     borne = sizes._BUCKLING * root * 0.5 * 0.04
     assert sizes._without_creases(surface(), 0.5, own) == pytest.approx(borne)
     assert sizes.hopeless(surface(), 0.5, own, 34.0 * borne)
     assert not sizes.hopeless(surface(), 0.5, own, 33.0 * borne), "a thirtieth and more may do"
+
+
+@pytest.mark.parametrize(("span", "thrust"), [(20.0, 2.5), (4.0, 2.0)])
+def test_rods_that_would_buckle_between_their_joints_are_hopeless_however_stiff_the_shell(
+    monkeypatch, span, thrust
+):
+    """Of a radius of 5 m: half of that, or of the span, times the spacing of 0.5 m is a rod's thrust over the
+    load; clamped it buckles under 4 π² EI / s²."""
+    monkeypatch.setattr(sizes, "curvature_usual", lambda _: 0.2)
+    monkeypatch.setattr(sizes, "width", lambda _: span)
+    monkeypatch.setattr(sizes, "_without_creases", lambda *_: math.inf)
+    borne = 4.0 * math.pi**2 * 2.0 / 0.25 / (thrust * 0.5)
+    own = section(0.01, bending=2.0)
+    assert sizes.hopeless(surface(), 0.5, own, 3.4 * borne)
+    assert not sizes.hopeless(surface(), 0.5, own, 3.3 * borne), "three tenths and more may do"
 
 
 def test_sections_are_those_of_a_catalogue_that_is_named_or_of_all_that_are_shipped_for_rods():
