@@ -58,10 +58,12 @@ class Refused:
 
     @property
     def offered(self) -> Refusal:
-        """The error with the way out as its remedy."""
+        """The error with the way out as its remedy: instead of a radius to round to that nobody has tried, or
+        with which no design stood."""
         if self.way_out is None:
             return self.error
-        return renewed(self.error, f"{self.way_out.told}. {_TAKEN} goes on so at once")
+        instead = isinstance(self.error, Unbuildable) and not self.way_out.wish.rod
+        return renewed(self.error, f"{self.way_out.told}. {_TAKEN} goes on so at once", instead=instead)
 
 
 def with_ways_out(

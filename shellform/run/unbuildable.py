@@ -225,8 +225,8 @@ def _uncovered(surface: Surface, failure: Obstacle | None, wish: DesignWish) -> 
     if failure is not None:
         needed = max(needed, _rounding(surface, failure, wish))
     return Unbuildable(
-        f"no net of {spacing:g} m covers the surface{'' if error is None else f' ({_said(error)})'}; it is "
-        f"curved most at {_at(surface.vertices[most])}, to a radius of {radius:.3g} m",
+        f"no net of {spacing:g} m covers the surface, which is curved most at {_at(surface.vertices[most])}, to a radius of "
+        f"{radius:.3g} m{'' if error is None else f': {_said(error)}'}",
         why=Why.NET,
         where="net.spacing",
         remedy=f"Round the surface there to {needed:.2g} m or more.",

@@ -129,9 +129,11 @@ def _step(path: Path, surface: Surface) -> str:
     return f", {path.name}"
 
 
-def renewed(refusal: InputError | NotConverged, offer: str) -> InputError | NotConverged:
-    """The same refusal with the offer before its remedy."""
-    remedy = f"{offer}. {f'Or: {refusal.remedy}' if refusal.remedy else ''}".strip()
+def renewed(
+    refusal: InputError | NotConverged, offer: str, *, instead: bool = False
+) -> InputError | NotConverged:
+    """The same refusal with the offer before its remedy, or `instead` of it."""
+    remedy = f"{offer}. {f'Or: {refusal.remedy}' if refusal.remedy and not instead else ''}".strip()
     if isinstance(refusal, NoNet):
         return NoNet(refusal.reason, refusal.what, where=refusal.where, value=refusal.value, remedy=remedy)
     if isinstance(refusal, InputError):

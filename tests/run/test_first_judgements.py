@@ -404,8 +404,8 @@ def test_a_surface_that_no_net_covers_is_refused_in_sentences(monkeypatch):
     surface = SimpleNamespace(vertices=np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.5]]))
     failure = Obstacle(Why.NET, 0.5, 0.05, error=sf.InputError("it folds there"))
     assert str(unbuildable.refused(surface, failure, SimpleNamespace(rod=None))) == (
-        "net.spacing: no net of 0.5 m covers the surface (it folds there); it is curved most at (1, 2, 0.5) m, to a radius of "
-        "0.3 m. Round the surface there to 4 m or more."
+        "net.spacing: no net of 0.5 m covers the surface, which is curved most at (1, 2, 0.5) m, to a radius of 0.3 m: "
+        "it folds there. Round the surface there to 4 m or more."
     )
     choice = SimpleNamespace(label="a rod", catalogue="a catalogue")
     monkeypatch.setattr(unbuildable, "least_spacing", lambda _: 0.8)

@@ -40,6 +40,28 @@ def test_walls_may_help_what_tips_falls_or_breaks_where_beams_carry_its_outer_ed
     assert not first_refusal._walls_may_help(error, None, DesignWish()), "round an opening they don't"
 
 
+@pytest.mark.parametrize(
+    ("error", "rod", "instead"),
+    [
+        (refusal(Why.NET), None, True),
+        (refusal(Why.STRENGTH), None, True),
+        (refusal(Why.STRENGTH), "gfrp_rods", False),  # to leave the rods out is another way
+        (Tips("tips", where="edges", remedy="Bring it down."), None, False),
+        (NotConverged("falls", remedy="Give it a rise."), None, False),
+    ],
+)
+def test_a_way_out_stands_instead_of_a_radius_that_nobody_tried_and_beside_other_remedies(
+    error, rod, instead
+):
+    """A groin vault said "Or: Round the surface there to 1.5 m or more", of which 1.85 and 3.14 m had been
+    tried in vain before 5.34."""
+    way_out = first_refusal.WayOut(STANDS, DesignWish(rod=rod), "The nearest is there", None)
+    told = first_refusal.Refused(error, way_out).offered
+    other = "" if instead else f" Or: {error.remedy}"
+    assert told.remedy == f"The nearest is there. --way-out goes on so at once.{other}"
+    assert first_refusal.Refused(error).offered is error
+
+
 @pytest.mark.parametrize("stands", [True, False])
 def test_walls_are_offered_with_their_height_where_a_design_stands_on_them(monkeypatch, stands):
     tried, said = [], []
