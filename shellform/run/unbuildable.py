@@ -35,7 +35,7 @@ _ARCHED = 0.5  # of its larger side: a radius that makes a vault of a roof of fl
 _WORTH = 1.3  # times the radius to which rods bend now, at the least, for rounding to be worth while
 _FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
 _IN_A_LINE = 0.02  # of the net's extent: supports that keep so near to a line don't keep it from tipping
-_SUSPECTED = ("mm", "cm", "in", "ft")  # units of files that were taken for metres, the likeliest first
+_SUSPECTED = ("mm", "cm", "in", "ft")  # units of files that were taken for metres, or metres for them
 
 
 class Unbuildable(InputError):
@@ -150,12 +150,17 @@ def refuse_size(surface: Surface) -> None:
     if SMALLEST <= side <= LARGEST:
         return
     x, y, z = surface.size
-    fitting = [unit for unit in _SUSPECTED if 2.0 <= side * METRES[unit] <= 0.5 * LARGEST]
-    remedy = (
-        f"Give the file's unit: --unit {fitting[0]} makes it {side * METRES[fitting[0]]:.3g} m."
-        if fitting
-        else "Scale the file to the size that is meant."
-    )
+    likely = (2.0, 0.5 * LARGEST)
+    taken = [unit for unit in _SUSPECTED if likely[0] <= side * METRES[unit] <= likely[1]]
+    stated = [unit for unit in _SUSPECTED if likely[0] <= side / METRES[unit] <= likely[1]]
+    remedy = "Scale the file to the size that is meant."
+    if taken:
+        remedy = f"Give the file's unit: --unit {taken[0]} makes it {side * METRES[taken[0]]:.3g} m."
+    elif stated:
+        remedy = (
+            f"If {stated[0]} was stated and metres were meant, state metres, in the program that wrote the file or by --unit m: "
+            f"that makes it {side / METRES[stated[0]]:.3g} m. Else scale it to the size that is meant."
+        )
     raise InputError(
         f"is {x:.4g} × {y:.4g} × {z:.4g} m, which no gridshell is ({SMALLEST:g} to {LARGEST:g} m)",
         where="surface.unit",

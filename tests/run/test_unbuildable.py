@@ -72,7 +72,7 @@ def test_shells_of_a_fifth_of_a_metre_to_150_m_in_plan_are_of_a_size_that_there_
         ((151.0, 1.0, 1.0), "in", "3.84"),
         ((7500.0, 1.0, 1.0), "mm", "7.5"),
         ((76000.0, 1.0, 1.0), None, None),
-        ((0.199, 0.1, 9.0), None, None),
+        ((0.0019, 0.001, 9.0), None, None),
     ],
 )
 def test_a_size_that_no_shell_has_is_refused_with_the_first_unit_that_makes_a_building_of_it(
@@ -86,6 +86,16 @@ def test_a_size_that_no_shell_has_is_refused_with_the_first_unit_that_makes_a_bu
         assert told.value.remedy == "Scale the file to the size that is meant."
     else:
         assert told.value.remedy == f"Give the file's unit: --unit {unit} makes it {metres} m."
+
+
+@pytest.mark.parametrize(("side", "unit", "metres"), [(0.01, "mm", "10"), (0.199, "cm", "19.9")])
+def test_of_a_shell_that_is_far_too_small_metres_are_suspected_that_were_stated_as_another_unit(
+    side, unit, metres
+):
+    with pytest.raises(InputError, match="which no gridshell is") as told:
+        refuse_size(of_size(side, side, 0.3 * side))
+    assert told.value.remedy.startswith(f"If {unit} was stated and metres were meant, state metres")
+    assert f"makes it {metres} m" in told.value.remedy
 
 
 @pytest.mark.parametrize("axes", [(0, 1, 2), (2, 0, 1), (1, 2, 0)])
