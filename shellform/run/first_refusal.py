@@ -3,8 +3,9 @@
 Three are tried, each where the reason says that it may help, and offered only where a design then stood:
 walls all round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a
 rounded surface, where its rods are bent too much (way_out.py), on walls where it falls on edge beams; and as
-much concrete as these bear, where no rounded surface helps. None is begun once the work is done that a
-surface is worth. Each ends with the first design that stands; who goes that way has it finished.
+much concrete as these bear, where no rounded surface helps, or it falls of its load alone. None is begun once
+the work is done that a surface is worth. Each ends with the first design that stands; who goes that way has
+it finished.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from shellform.run.first_net import Allowance
 from shellform.run.first_trial import FirstDesign
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish
-from shellform.run.unbuildable import Tips, Unbuildable, Why, flat_between_creases
+from shellform.run.unbuildable import Falls, Tips, Unbuildable, Why, flat_between_creases
 from shellform.run.way_out import BUILDABLE, COVERED, nearest_buildable, renewed
 from shellform.surface.shape.target import Surface
 
@@ -63,6 +64,8 @@ class Refused:
         if self.way_out is None:
             return self.error
         instead = isinstance(self.error, Unbuildable) and not self.way_out.wish.rod
+        if isinstance(self.error, Falls):  # its own remedy is the layer
+            instead = self.error.bears is not None and self.error.bears == self.way_out.wish.thickness
         return renewed(self.error, f"{self.way_out.told}. {_TAKEN} goes on so at once", instead=instead)
 
 
@@ -87,6 +90,9 @@ def with_ways_out(
         if way_out is None:
             refusal = refusal.untried() if again.too_late else refusal.in_vain()
             way_out = _poured_first(refusal, surface, wish, say, whole.part(_TRIED))
+    if way_out is None and isinstance(refusal, Falls) and _may_be_less(refusal, wish) and not whole.over:
+        way_out = _poured_first(refusal, surface, wish, say, whole.part(_TRIED))
+        refusal = refusal if way_out is not None else refusal.in_vain()
     return Refused(refusal, way_out)
 
 
@@ -193,12 +199,18 @@ def _on_walls(surface: Surface, wish: DesignWish, say: Say, allowance: Allowance
     )
 
 
+def _may_be_less(refusal: Unbuildable | Falls, wish: DesignWish) -> bool:
+    """Whether less concrete is known to be borne, and no other was asked for."""
+    return refusal.bears is not None and wish.thickness is None
+
+
 def _poured_first(
-    refusal: Unbuildable, surface: Surface, wish: DesignWish, say: Say, allowance: Allowance
+    refusal: Unbuildable | Falls, surface: Surface, wish: DesignWish, say: Say, allowance: Allowance
 ) -> WayOut | None:
     """A first layer of concrete; None where none is known to be borne."""
-    if refusal.bears is None or wish.thickness is not None:
+    if not _may_be_less(refusal, wish):
         return None
+    assert refusal.bears is not None
     how, layer = f"with {1e3 * refusal.bears:g} mm", replace(wish, thickness=refusal.bears)
     try:
         design = _trial(how, surface, layer, allowance, say)

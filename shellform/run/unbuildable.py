@@ -36,6 +36,7 @@ _WORTH = 1.3  # times the radius to which rods bend now, at the least, for round
 _FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
 _IN_A_LINE = 0.02  # of the net's extent: supports that keep so near to a line don't keep it from tipping
 _SUSPECTED = ("mm", "cm", "in", "ft")  # units of files that were taken for metres, or metres for them
+_MORE_RISE = "Give the surface more rise: buckling grows with the square of its curvature."
 
 
 class Unbuildable(InputError):
@@ -79,6 +80,19 @@ class Unbuildable(InputError):
             radius=self.radius,
             bears=self.bears,
         )
+
+
+class Falls(NotConverged):
+    """A shell that its load brings down, or stresses too much, for the reason `what`; `bears`: the thickness
+    of concrete, m, with which it was found to stand, if one was."""
+
+    def __init__(self, what: str, *, remedy: str, bears: float | None = None) -> None:
+        self.bears = bears
+        super().__init__(what, residual=math.nan, iterations=0, remedy=remedy)
+
+    def in_vain(self) -> Falls:
+        """The same, where that concrete, asked for from the start, led to no design."""
+        return Falls(self.what, remedy=_MORE_RISE)
 
 
 class Tips(InputError):
@@ -264,7 +278,7 @@ def _broken(surface: Surface, failure: Obstacle, choice: RodChoice, wish: Design
     )
 
 
-def _fallen(failure: Obstacle, choice: RodChoice, bears: float | None) -> NotConverged:
+def _fallen(failure: Obstacle, choice: RodChoice, bears: float | None) -> Falls:
     """The refusal of a shell that falls under its load, or is stressed too much by it."""
     bearing = {Why.EDGES: "edge beams", Why.CABLES: "cables"}.get(failure.why, "rods")
     falls = failure.factor < NEEDED or failure.why is Why.SCATTER
@@ -280,8 +294,8 @@ def _fallen(failure: Obstacle, choice: RodChoice, bears: float | None) -> NotCon
         )
         remedy = f"{layer} --thickness {bears:g}: pour that first, and the rest when it has hardened."
     else:
-        remedy = "Give the surface more rise: buckling grows with the square of its curvature."
-    return NotConverged(what, residual=math.nan, iterations=0, remedy=remedy)
+        remedy = _MORE_RISE
+    return Falls(what, remedy=remedy, bears=bears)
 
 
 def _place(failure: Obstacle) -> str:

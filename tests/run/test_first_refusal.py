@@ -8,7 +8,7 @@ import pytest
 from shellform.errors import InputError, NotConverged
 from shellform.run import first_refusal
 from shellform.run.sizes import DesignWish
-from shellform.run.unbuildable import Tips, Unbuildable, Why
+from shellform.run.unbuildable import Falls, Tips, Unbuildable, Why
 
 STANDS = object()  # a design
 
@@ -48,6 +48,7 @@ def test_walls_may_help_what_tips_falls_or_breaks_where_beams_carry_its_outer_ed
         (refusal(Why.STRENGTH), "gfrp_rods", False),  # to leave the rods out is another way
         (Tips("tips", where="edges", remedy="Bring it down."), None, False),
         (NotConverged("falls", remedy="Give it a rise."), None, False),
+        (Falls("falls", remedy="Rods bear --thickness 0.02.", bears=0.02), None, False),
     ],
 )
 def test_a_way_out_stands_instead_of_a_radius_that_nobody_tried_and_beside_other_remedies(
@@ -87,3 +88,45 @@ def test_walls_are_offered_with_their_height_where_a_design_stands_on_them(monke
     over = first_refusal._on_walls(surface, DesignWish(), said.append, first_refusal.Allowance(0))
     assert over is None
     assert "left untried" in said[-1]
+
+
+@pytest.mark.parametrize(
+    ("stands", "asked", "work", "tried"),
+    [
+        (True, None, 1000, [0.009]),
+        (False, None, 1000, [0.009]),
+        (True, 0.03, 1000, []),  # another was asked for
+        (True, None, 0, []),
+    ],
+)
+def test_of_a_shell_that_falls_the_layer_that_stood_is_tried_from_the_start_before_it_is_offered(
+    monkeypatch, tmp_path, stands, asked, work, tried
+):
+    """A pillow of 3 m that stands on the ground all round was told to bear 9 mm, and --way-out led to no
+    case."""
+    asked_for = []
+
+    def search(surface, wish, say, allowance):
+        asked_for.append(wish.thickness)
+        if not stands:
+            raise NotConverged("falls")
+        return STANDS
+
+    monkeypatch.setattr(first_refusal, "standing_design", search)
+    monkeypatch.setattr(first_refusal, "stretches_of", lambda surface: [])
+    falls = Falls("falls", remedy="Rods bear --thickness 0.009.", bears=0.009)
+    whole = first_refusal.Allowance(work)
+    found = first_refusal.with_ways_out(
+        falls, None, DesignWish(thickness=asked), tmp_path / "a.toml", lambda text: None, whole
+    )
+    assert asked_for == tried
+    if tried and stands:
+        assert found.way_out.wish.thickness == 0.009
+        assert found.offered.remedy == (
+            "With --thickness 0.009 this goes on: pour that first, and the rest when it has hardened. "
+            "--way-out goes on so at once."
+        )
+    elif tried:
+        assert found.offered.remedy.startswith("Give the surface more rise"), "not what was tried in vain"
+    else:
+        assert found.offered is falls
