@@ -1,5 +1,6 @@
 """What the page says: answers, numbers, charts, embedded pictures, and a surface made light."""
 
+import base64
 import math
 import re
 from dataclasses import replace
@@ -313,3 +314,19 @@ def test_the_view_has_the_edge_beams_on_which_arches_hang():
     drawn = view_data.net_data(standing, "arches", "", none)
     assert len(standing.edges) == 2
     assert drawn["edges"] == [pair for line in standing.edges for pair in line.ends.tolist()]
+
+
+def test_before_the_grid_is_bent_edge_beams_are_in_their_places_and_the_grid_lies_on_the_ground_between_them():
+    surface = barrel(raised=-3.0)
+    net = sf.pull_net(surface, spacing=0.1, gap=0.002, angle=np.deg2rad(30.0), elements=2)
+    standing = stand(net, surface)
+    place = standing.target.positions
+    drawn = view_data.net_data(standing, "arches", "", np.zeros((0, 2), dtype=np.int64))
+    flat = np.frombuffer(base64.b64decode(drawn["flat"]), dtype="<f4").reshape(-1, 3)
+    flat = flat + 0.5 * (place.min(axis=0) + place.max(axis=0))
+    rods = np.unique(net.grid.rod_ends)
+    beams = np.setdiff1d(np.arange(len(place)), rods)
+    np.testing.assert_allclose(flat[beams], place[beams], atol=1e-6)
+    assert flat[rods, 2].min() == pytest.approx(place[:, 2].min(), abs=1e-6)
+    assert np.ptp(flat[rods, 2]) == pytest.approx(net.grid.gap, abs=1e-6)
+    assert np.linalg.norm((flat - place)[rods, :2], axis=1).mean() < 0.1

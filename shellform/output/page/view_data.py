@@ -191,7 +191,7 @@ def _geometry(net: Net, middle: Reals, place: Reals) -> dict[str, Any]:
         "middle": [_short(value) for value in middle],
         "box": [[_short(v) for v in end] for end in (place.min(axis=0) - middle, place.max(axis=0) - middle)],
         "target": _floats(place - middle),
-        "flat": _floats(laid_out(grid.flat, place) - middle),
+        "flat": _floats(_before(net, place) - middle),
         "crossings": grid.crossing_nodes.tolist(),
         "supports": net.supports.tolist(),
         "edges": net.edge_lines.tolist(),
@@ -205,6 +205,15 @@ def _geometry(net: Net, middle: Reals, place: Reals) -> dict[str, Any]:
             for number, rod in enumerate(grid.rods)
         ],
     }
+
+
+def _before(net: Net, place: Reals) -> Reals:
+    """All nodes (n, 3), m, before the grid is bent: that flat, edge beams where they will be."""
+    rods = np.unique(net.grid.rod_ends)
+    flat = place.copy()
+    flat[rods] = laid_out(net.grid.flat[rods], place[rods])
+    flat[rods, 2] += place[:, 2].min() - flat[rods, 2].min()
+    return flat
 
 
 def laid_out(flat: Reals, place: Reals) -> Reals:
