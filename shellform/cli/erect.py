@@ -13,6 +13,23 @@ from shellform.cli.terminal import tell_lines
 def erect(
     run: Annotated[Path, typer.Argument(help="Run folder.")],
     design: Annotated[str | None, typer.Option(help="Left out: the run's last.")] = None,
+    by: Annotated[
+        str | None,
+        typer.Option(
+            help="supports (that move in) or scaffold (that rises under the crossings); left out: scaffold where "
+            "there are edge beams, else supports."
+        ),
+    ] = None,
+    props: Annotated[
+        Path | None,
+        typer.Option(
+            help="What the scaffold props: CSV file of node or crossing; left out: every second "
+            "crossing, but where it is steep."
+        ),
+    ] = None,
+    tighten_first: Annotated[
+        bool, typer.Option("--tighten-first", help="Cables before the scaffold is lowered.")
+    ] = False,
     load: Annotated[
         str | None, typer.Option(help="In the end: a load case, or a CSV file of node, fx, fy, fz in N.")
     ] = None,
@@ -22,7 +39,8 @@ def erect(
         Path | None, typer.Option(help="Cables tightened together: CSV file of cable, group.")
     ] = None,
     way: Annotated[
-        Path | None, typer.Option(help="Places of the supports on the way: CSV file of stop, node, x, y, z.")
+        Path | None,
+        typer.Option(help="Places of supports that move in, on their way: CSV file of stop, node, x, y, z."),
     ] = None,
     step: Annotated[float, typer.Option(help="Share of a stage.")] = 0.1,
     output: Annotated[Path | None, typer.Option(help="Folder for results; left out: RUN/schedules.")] = None,
@@ -34,6 +52,9 @@ def erect(
         onsite.erect(
             run,
             design=design,
+            by=by,
+            props=props,
+            tighten_first=tighten_first,
             load=load,
             weight=weight,
             lift=lift,

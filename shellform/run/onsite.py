@@ -24,9 +24,11 @@ from shellform.errors import (
     require_known,
 )
 from shellform.gridshell.gridshell import Gridshell
+from shellform.records.words import number
 from shellform.run.folder import Run, read_run
 from shellform.run.site_sources import design_named, load_named, scan_under, scanned
 from shellform.site import calibration, erection, measurements, retensioning
+from shellform.site.erection_steps import Props
 from shellform.site.scans import counted_alike
 from shellform.site.surveys import doubtful, read_survey
 from shellform.structure.elements.state import State
@@ -198,8 +200,8 @@ def replay(
             "replay",
             ("round", "rms distance from the design [mm]", "cables turned", "turns"),
             tuple(
-                (number, _mm(misfit, len(goal)), cables, turns)
-                for number, (misfit, (cables, turns)) in enumerate(zip(played.misfits, turned, strict=True))
+                (round_, _mm(misfit, len(goal)), cables, turns)
+                for round_, (misfit, (cables, turns)) in enumerate(zip(played.misfits, turned, strict=True))
             ),
         )
     )
@@ -213,6 +215,9 @@ def erect(
     folder: Path,
     *,
     design: str | None = None,
+    by: str | None = None,
+    props: Path | None = None,
+    tighten_first: bool = False,
     load: str | None = None,
     weight: str | None = None,
     lift: str | None = None,
@@ -233,6 +238,9 @@ def erect(
     done = erection.erect(
         shell,
         run.designs[name],
+        by=by,
+        props=None if props is None else measurements.read_nodes(props, shell),
+        tighten_first=tighten_first,
         way=stops,
         groups=None if groups is None else measurements.read_groups(groups, run.designs[name]),
         load=carried[0],
@@ -249,7 +257,13 @@ def erect(
         stage=np.array([each.stage for each in done.steps]),
     )
     worst, last = done.worst, done.steps[-1]
-    breaks = "rods break on the way: give the supports other --way points, or choose thinner or stronger rods"
+    borne = done.props
+    other = (
+        "erect --by scaffold, give the supports other --way points"
+        if borne is None
+        else "prop other crossings (--props)"
+    )
+    breaks = f"rods break on the way: {other}, or choose thinner or stronger rods"
     return SiteResult(
         [
             *counted,
@@ -257,11 +271,25 @@ def erect(
             f"largest rod stress {1e-6 * worst.stress:.0f} MPa, {worst.stress / done.strength:.2f} of the "
             f"strength, at {worst.share:.2f} of {worst.stage}; "
             f"{1e-6 * last.stress:.0f} MPa in the end",
-            f"largest cable tension {max(each.tension for each in done.steps):.3g} N, largest force on a "
-            f"support {max(each.reaction for each in done.steps):.3g} N",
+            f"largest cable tension {number(max(each.tension for each in done.steps))} N, largest force on a "
+            f"support {number(max(each.reaction for each in done.steps))} N",
+            *([] if borne is None else [_scaffold(borne)]),
             *([breaks] if worst.stress > done.strength else []),
         ],
         files,
+    )
+
+
+def _scaffold(borne: Props) -> str:
+    """What a scaffold bears."""
+    held = (
+        f"holds up to {borne.pulled} of them down, where the grid would lift off, with up to {number(borne.pull)} N"
+        if borne.pulled
+        else "holds none of them down"
+    )
+    return (
+        f"the scaffold pushes crossings up with up to {number(borne.push)} N each and {held}; ropes draw rods' ends in "
+        f"with up to {number(borne.rope)} N"
     )
 
 
@@ -326,12 +354,12 @@ def _predicted(shell: Gridshell, before: State, step: retensioning.Adjustment, g
     """
     after = step.belief.state.positions
     rows = []
-    for number, node in enumerate(shell.net.grid.crossing_nodes[:, 1].tolist()):
+    for crossing, node in enumerate(shell.net.grid.crossing_nodes[:, 1].tolist()):
         away = [
             f"{1e3 * float(np.linalg.norm(each[node] - goal[node])):.3f}"
             for each in (before.positions, after)
         ]
-        rows.append((number, node, *(f"{each:.6f}" for each in after[node]), *away))
+        rows.append((crossing, node, *(f"{each:.6f}" for each in after[node]), *away))
     heads = ("crossing", "node", "x", "y", "z", "distance before [mm]", "distance after [mm]")
     return table_text(Table("predicted", heads, tuple(rows)))
 

@@ -1,9 +1,9 @@
 """Erection: from the grid laid flat to the braced shell, step by step, with what the rods bear on the way.
 
 The flat grid is laid out where it fits its supports best (turned and shifted in plan, which doesn't stress
-it). Then the supports move to their places on the target, straight or by way points; the cables, slack so
-far, are tightened, all at once or group after group, from the length at which they just hang straight to
-their rest lengths; then a load may follow.
+it). Then a scaffold raises it (scaffold.py), or the supports move to their places on the target, straight or
+by way points; the cables, slack so far, are tightened, all at once or group after group, from the length at
+which they just hang straight to their rest lengths; then a load may follow.
 
 A flat grid whose supports close in can buckle up, down and in waves: its stable paths all begin in one point.
 The path that leads to the erected shell is found from its other end: the structure is elastic, so that its
@@ -18,16 +18,17 @@ Rods in two layers slide until the cables are tight; then they are locked as the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals, indices, reals
-from shellform.errors import InputError, NotConverged, require_number
+from shellform.errors import InputError, NotConverged, require_known, require_number
 from shellform.gridshell.gridshell import Design, Gridshell, Rod
-from shellform.gridshell.layers import TwoLayers, locks, rod_stress
-from shellform.structure.elements import rotation
+from shellform.gridshell.layers import TwoLayers, locks
+from shellform.site.erection_steps import Erection, ErectionStep, Site, laid_out
+from shellform.site.scaffold import Scaffold
 from shellform.structure.elements.beam import joined
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -35,81 +36,22 @@ from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import Equilibrium, find_equilibrium
 from shellform.structure.solve.loading import advance
-from shellform.tables import Table, table_text
 
+SUPPORTS, SCAFFOLD = WAYS_UP = ("supports", "scaffold")
 STEP = 0.1  # of a stage
 _SMALLEST = 1.0 / 256.0  # of a stage: shorter steps lead on where nothing stands
 _SLACK = 1.5  # times its length in the target: a cable that isn't tightened yet
 _LEAST = 1e-4  # of a stage, which then has ten thousand steps
 _TRIAL = 25  # factorisations of one step of tightening
 
-_COLUMNS = (
-    "stage",
-    "share",
-    "height [mm]",
-    "largest stress [MPa]",
-    "stress/strength",
-    "rod element",
-    "largest tension [N]",
-    "largest reaction [N]",
-)
-
-
-@dataclass(frozen=True, eq=False)
-class ErectionStep:
-    """One state on the way: the `stage` it belongs to and the `share` of it that is done; `height`, m, of the
-    highest node over the lowest support; the largest rod `stress`, Pa, and the `element` that bears it; the
-    largest cable `tension`, N; the largest `reaction`, N, of a support; `state`."""
-
-    stage: str
-    share: float
-    height: float
-    stress: float
-    element: int
-    tension: float
-    reaction: float
-    state: State
-
-
-@dataclass(frozen=True, eq=False)
-class Erection:
-    """All `steps` in the order of building; `strength`, Pa, of the rods (inf: not known)."""
-
-    steps: tuple[ErectionStep, ...]
-    strength: float
-
-    @property
-    def worst(self) -> ErectionStep:
-        """The step in which a rod bears the largest stress."""
-        return max(self.steps, key=lambda step: step.stress)
-
-    @property
-    def utilisation(self) -> float:
-        """The largest stress on the way over the strength."""
-        return self.worst.stress / self.strength
-
-    def table(self) -> str:
-        """Step after step as CSV."""
-        rows = tuple(
-            (
-                each.stage,
-                f"{each.share:.3f}",
-                f"{1e3 * each.height:.2f}",
-                f"{1e-6 * each.stress:.2f}",
-                f"{each.stress / self.strength:.3f}",
-                each.element,
-                f"{each.tension:.3f}",
-                f"{each.reaction:.3f}",
-            )
-            for each in self.steps
-        )
-        return table_text(Table("erection", _COLUMNS, rows))
-
 
 def erect(
     shell: Gridshell,
     design: Design,
     *,
+    by: str | None = None,
+    props: ArrayLike | None = None,
+    tighten_first: bool = False,
     way: Sequence[ArrayLike] = (),
     groups: Sequence[ArrayLike] | None = None,
     lift: Reals | None = None,
@@ -119,20 +61,25 @@ def erect(
 ) -> Erection:
     """The erection of the shell with the design's cables.
 
-    `way`: positions (s, 3), m, of the supports between the flat grid and the target, in the order of
-    building; `groups`: candidate cables tightened together, group after group (all at once); dead loads (n,
-    6), N: `lift` while the supports move, `weight` all the time, `load` in the end. Raises NotConverged where
-    no stable path leads from the flat grid to the erected one, or tightening or the load ends it.
+    - `by`: what brings the grid up, "supports" that move in or a "scaffold" (scaffold.py); None: a scaffold
+      where there are edge beams, else supports.
+    - Of a scaffold, `props`: nodes of the crossings that it bears (None: every second one);
+      `tighten_first`: the cables are tightened before it goes.
+    - Of supports, `way`: their positions (s, 3), m, between the flat grid and the target, in the order of
+      building; `lift`, a dead load (n, 6), N, while they move.
+    - `groups`: candidate cables tightened together, group after group (all at once); dead loads (n, 6), N:
+      `weight` all the time, `load` in the end.
+
+    Raises InputError, and NotConverged where no stable path leads from the flat grid to the erected one, or
+    tightening or the load ends it.
     """
     require_number(step, least=_LEAST, most=1.0, where="erect.step", give="a share of the way, such as 0.1")
-    if shell.net.edges:
-        raise InputError(
-            "is worked out for shells that stand on the ground all round: edge beams are clamped to the grid "
-            "once it is bent",
-            where="erect",
-            value=f"{len(shell.net.edges)} edge beams",
-            remedy="Fill the edges (edges.outer, edges.openings), or work the lifting out by hand.",
-        )
+    by = _way_up(
+        shell,
+        by,
+        supports_only=len(way) > 0 or lift is not None,
+        scaffold_only=props is not None or tighten_first,
+    )
     nodes = shell.node_count
     none = np.zeros((nodes, 6))
     own, carried, last = (
@@ -142,44 +89,99 @@ def erect(
     teams = _teams(design, groups)
     locked, shell = shell, _sliding(shell)
     unbraced = replace(design, present=np.zeros(len(design.present), dtype=bool))
-    site = _Site(shell, unbraced)
+    now = replace(design, rest_length=np.maximum(_SLACK * shell.cable_lengths, design.rest_length))
+    scaffold = Scaffold(shell, unbraced, own, props, step) if by == SCAFFOLD else None
+    free = Site(shell, now) if scaffold is None else scaffold.standing(now)
+    if scaffold is None:
+        site = Site(shell, unbraced)
+        state, braced = _erected(site, own), free
+        steps = _taken_down(site, state, way, carried, own, step)
+    else:
+        steps, braced = scaffold.up(), scaffold.site(now) if tighten_first else free
+        if not tighten_first:
+            steps += scaffold.taken_away(unbraced, steps[-1].state)
+        state = steps[-1].state
+    for number, team in enumerate(teams, 1):
+        stage = "tightening" if len(teams) == 1 else f"tightening group {number}"
+        now, state, more = _tightened(braced, now, design, state, team, own, stage, step)
+        steps += more
+    if scaffold is not None and tighten_first:
+        steps += scaffold.taken_away(now, state)
+        state = steps[-1].state
+    if last.any():
+        there = _locked(locked, free, now, state)
+        steps += _loaded(Site(locked, now, there, free.holding), state, own, last, step)
+    return Erection(tuple(steps), shell.rod.strength)
+
+
+def _locked(locked: Gridshell, free: Site, now: Design, state: State) -> Assembly:
+    """The braced shell that stands freely; its rods, if they have two layers, locked as they lie."""
+    shell = free.shell
+    blocks = locks(shell.net, locked.rod.resized(now.radius).section, state)
+    if blocks is None:
+        return free.assembly.with_parts((shell.beams(now.radius), shell.cables(now)))
+    network = shell.network(now)
+    return assemble(replace(network, beams=joined(network.beams, blocks)))
+
+
+def _loaded(site: Site, state: State, weight: Reals, load: Reals, step: float) -> list[ErectionStep]:
+    """The load coming on."""
+    steps = list[ErectionStep]()
+
+    def note(share: float, found: Equilibrium) -> None:
+        steps.append(site.step("loading", share, found.state, weight + share * load))
+
+    drive = Drive(load, np.zeros_like(load), weight)
+    reached = advance(site.assembly, state, drive, step=step, stay=True, report=note)
+    if not reached.on_branch:
+        raise NotConverged(
+            f"The shell bears {reached.share:.2f} of the load only",
+            state=reached.equilibrium.state,
+            remedy="Brace it better or load it less.",
+        )
+    return steps
+
+
+def _way_up(shell: Gridshell, by: str | None, *, supports_only: bool, scaffold_only: bool) -> str:
+    """The way that the grid goes up. Raises InputError for what doesn't go with it."""
+    edges = len(shell.net.edges)
+    usual = SCAFFOLD if edges or scaffold_only else SUPPORTS
+    way = usual if by is None else by
+    require_known(way, WAYS_UP, where="erect.by", what="is no way up")
+    if way == SUPPORTS and edges:
+        raise InputError(
+            "doesn't bring up a shell with edge beams, whose rods' ends would break on straight ways there",
+            where="erect.by",
+            value=way,
+            remedy="Erect it by a scaffold.",
+        )
+    if way == SCAFFOLD and supports_only:
+        raise InputError(
+            "go with supports that move in",
+            where="erect",
+            value="way, lift",
+            remedy="Leave them out." if edges else "Leave them out, or erect by supports.",
+        )
+    if way == SUPPORTS and scaffold_only:
+        raise InputError(
+            "go with a scaffold",
+            where="erect",
+            value="props, tighten_first",
+            remedy="Leave them out, or erect by a scaffold.",
+        )
+    return way
+
+
+def _erected(site: Site, weight: Reals) -> State:
+    """The grid that stands by itself without cables."""
     try:
-        erected = find_equilibrium(site.assembly, shell.target, own).state
+        return find_equilibrium(site.assembly, site.shell.target, weight).state
     except NotConverged as error:
         raise NotConverged(
             "The erected grid doesn't stand under the weight before it is braced",
             state=error.state,
             remedy="Give a smaller weight, N, downwards negative.",
         ) from error
-    steps = _taken_down(site, erected, way, carried, own, step)
-    state, now = (
-        erected,
-        replace(design, rest_length=np.maximum(_SLACK * shell.cable_lengths, design.rest_length)),
-    )
-    braced = _Site(shell, now)
-    for number, team in enumerate(teams, 1):
-        stage = "tightening" if len(teams) == 1 else f"tightening group {number}"
-        now, state, more = _tightened(braced, now, design, state, team, own, stage, step)
-        steps += more
-    if last.any():
-        there = braced.assembly.with_parts((shell.beams(now.radius), shell.cables(now)))
-        blocks = locks(shell.net, locked.rod.resized(now.radius).section, state)
-        if blocks is not None:
-            network = shell.network(now)
-            there = assemble(replace(network, beams=joined(network.beams, blocks)))
-        site = _Site(locked, now, there)
-
-        def note(share: float, found: Equilibrium) -> None:
-            steps.append(site.step("loading", share, found.state, own + share * last))
-
-        reached = advance(there, state, Drive(last, none, own), step=step, stay=True, report=note)
-        if not reached.on_branch:
-            raise NotConverged(
-                f"The shell bears {reached.share:.2f} of the load only",
-                state=reached.equilibrium.state,
-                remedy="Brace it better or load it less.",
-            )
-    return Erection(tuple(steps), shell.rod.strength)
 
 
 def _sliding(shell: Gridshell) -> Gridshell:
@@ -190,56 +192,8 @@ def _sliding(shell: Gridshell) -> Gridshell:
     return replace(shell, rod=Rod(replace(section, composite=0.0)))
 
 
-def laid_out(shell: Gridshell) -> State:
-    """The flat, stress-free grid, turned and shifted so that its supports come nearest to their places in
-    plan, at their mean height.
-    """
-    flat, supports = shell.net.grid.flat, shell.net.supports
-    here, goal = flat[supports], shell.target.positions[supports]
-    middle, there = here.mean(axis=0), goal.mean(axis=0)
-    plan, wanted = (here - middle)[:, :2], (goal - there)[:, :2]
-    # The turn in plan that minimises the sum of squares has the angle of sum of conj(plan) * wanted as
-    # complex numbers.
-    cosine = float((plan * wanted).sum())
-    sine = float((plan[:, 0] * wanted[:, 1] - plan[:, 1] * wanted[:, 0]).sum())
-    angle = np.arctan2(sine, cosine)
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    quaternions = rotation.from_vectors(np.tile([0.0, 0.0, angle], (len(flat), 1)))
-    return State((flat - middle) @ turn.T + there, quaternions)
-
-
-class _Site:
-    """The shell with a design's cables, and what is read off its states."""
-
-    def __init__(self, shell: Gridshell, design: Design, assembly: Assembly | None = None) -> None:
-        self.shell, self.design = shell, design
-        self.assembly = assemble(shell.network(design)) if assembly is None else assembly
-        self.section = shell.rod.resized(design.radius).section
-
-    def step(self, stage: str, share: float, state: State, load: Reals) -> ErectionStep:
-        """The state as a step."""
-        beams, cables = self.assembly.beams[0], self.shell.cables(self.design)
-        stress = rod_stress(self.section, beams, beams.local_forces(state)).max(axis=1)
-        worst = int(np.argmax(stress))
-        tension = float(cables.tension(state).max(initial=0.0))
-        supports = self.shell.net.supports
-        forces = self.assembly.unbalanced(state, load)[supports, :3]
-        height = float(state.positions[:, 2].max() - state.positions[supports, 2].min())
-        return ErectionStep(
-            stage=stage,
-            share=float(share),
-            height=height,
-            stress=float(stress[worst]),
-            element=worst,
-            tension=tension,
-            reaction=float(np.linalg.norm(forces, axis=1).max()),
-            state=state,
-        )
-
-
 def _taken_down(
-    site: _Site, erected: State, way: Sequence[ArrayLike], lift: Reals, weight: Reals, step: float
+    site: Site, erected: State, way: Sequence[ArrayLike], lift: Reals, weight: Reals, step: float
 ) -> list[ErectionStep]:
     """Steps from the flat grid to the erected one, found the other way round."""
     shell = site.shell
@@ -282,7 +236,7 @@ def _taken_down(
 
 
 def _tightened(
-    site: _Site,
+    site: Site,
     now: Design,
     design: Design,
     start: State,
@@ -317,11 +271,12 @@ def _tightened(
                 raise NotConverged(
                     f"At {share:.2f} of the stage {stage!r} the grid loses stability",
                     state=state,
-                    remedy="Tighten the cables in other groups, or prop the grid.",
+                    remedy="Tighten the cables in other groups, or before a scaffold goes (--by scaffold, "
+                    "--tighten-first).",
                 )
             continue
         share, state, now = then, found.state, trial
-        steps.append(_Site(shell, trial, assembly).step(stage, share, state, load))
+        steps.append(site.beside(trial, assembly).step(stage, share, state, load))
     return now, state, steps
 
 

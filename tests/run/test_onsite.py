@@ -144,6 +144,25 @@ def test_erection_is_told_step_by_step(folder, run, tmp_path):
         )
 
 
+def test_erection_by_a_scaffold_tells_what_that_bears(folder, run, tmp_path):
+    props = written(tmp_path / "props.csv", "crossing", [(k,) for k in range(0, 170, 3)])
+    result = shellform(
+        "erect", folder, "--by", "scaffold", "--props", props, "--tighten-first", "--step", 0.5,
+        "--output", tmp_path,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    assert "the scaffold pushes crossings up with up to" in result.stdout
+    with (tmp_path / "erection.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    stages = list(dict.fromkeys(row["stage"] for row in rows))
+    assert stages == ["raising", "drawing in", "pinning", "tightening", "lowering"]
+    assert 0 < max(int(row["crossings held down"]) for row in rows) < 57
+    with np.load(tmp_path / "erection.npz") as shapes:
+        np.testing.assert_allclose(
+            shapes["positions"][-1], run.states["initial"]["none"].positions, atol=1e-6
+        )
+
+
 def test_groups_count_cables_as_drawings_do(shell, tmp_path):
     design = replace(shell.design(), present=np.arange(len(shell.cable_ends)) % 3 == 1)
     last = int(design.present.sum()) - 1
@@ -318,6 +337,8 @@ def test_bad_options_are_refused(folder, tmp_path):
     refused(shellform("survey", folder), "either a survey or --replay")
     refused(shellform("erect", tmp_path), "is no run folder")
     refused(shellform("erect", folder, "--step", 0), "erect.step")
+    refused(shellform("erect", folder, "--by", "balloon"), "Known: supports, scaffold")
+    refused(shellform("erect", folder, "--by", "supports", "--tighten-first"), "go with a scaffold")
     refused(shellform("erect", folder, "--step", "1e-300"), "erect.step: must be between 0.0001 and 1")
     refused(shellform("calibrate", folder), "Missing argument")
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["designs"].keys() == {

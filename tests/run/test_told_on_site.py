@@ -12,6 +12,7 @@ from shellform.gridshell.gridshell import Design
 from shellform.run import onsite
 from shellform.run.onsite import Survey
 from shellform.run.site_sources import Scanned, design_named, load_named
+from shellform.site.erection_steps import Props
 
 POSITIONS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 1.0, 0.5], [4.0, 4.0, 1.0]])
 SHELL = SimpleNamespace(
@@ -133,11 +134,13 @@ def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, 
     steps = [
         step("moving", 0.5, 80e6, 1.0, 40.0), step("moving", 1.0, 120e6, 7.5, 30.0), step("loading", 1.0, 60e6, 2.0, 9.0)
     ]  # fmt: skip
-    asked, strength = [], 240e6
+    asked, strength, borne = [], 240e6, None
 
     def erect(shell, own, **how):
         asked.append((own, how["load"], how["weight"], how["lift"], how["step"]))
-        return SimpleNamespace(steps=steps, worst=steps[1], strength=strength, table=lambda: "table")
+        return SimpleNamespace(
+            steps=steps, worst=steps[1], strength=strength, table=lambda: "table", props=borne
+        )
 
     monkeypatch.setattr(onsite.erection, "erect", erect)
     found = onsite.erect(tmp_path, load="wet", lift="none", step=0.125)
@@ -149,8 +152,18 @@ def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, 
     ]
     strength = 119e6
     assert onsite.erect(tmp_path, load="wet", lift="none", step=0.125).lines[3:] == [
-        "rods break on the way: give the supports other --way points, or choose thinner or stronger rods"
+        "rods break on the way: erect --by scaffold, give the supports other --way points, or choose thinner or stronger rods"
     ]
+    borne = Props(push=9570.4, pull=1086.4, pulled=108, rope=240.4)
+    assert onsite.erect(tmp_path, load="wet", lift="none", step=0.125).lines[3:] == [
+        "the scaffold pushes crossings up with up to 9\u202f570 N each and holds up to 108 of them down, where the grid would "
+        "lift off, with up to 1\u202f086 N; ropes draw rods' ends in with up to 240 N",
+        "rods break on the way: prop other crossings (--props), or choose thinner or stronger rods",
+    ]
+    borne = Props(push=9.0, pull=0.0, pulled=0, rope=1.5)
+    assert onsite.erect(tmp_path, load="wet", lift="none", step=0.125).lines[3] == (
+        "the scaffold pushes crossings up with up to 9 N each and holds none of them down; ropes draw rods' ends in with up to 1.5 N"
+    )
 
 
 @pytest.mark.parametrize(("residual", "doubtful"), [(0.29e-3, False), (0.32e-3, True)])

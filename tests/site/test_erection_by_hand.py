@@ -8,8 +8,9 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError, NotConverged
-from shellform.site import erection
-from shellform.site.erection import Erection, ErectionStep, laid_out
+from shellform.site import erection, erection_steps
+from shellform.site.erection_steps import Erection, ErectionStep, Holding, Props, laid_out
+from shellform.structure.elements.ropes import Ropes
 from shellform.structure.elements.rotation import matrices
 
 NONE = np.zeros((4, 6))
@@ -29,6 +30,40 @@ def test_the_worst_step_is_that_of_the_largest_stress_and_the_table_has_its_unit
     rows = built.table().splitlines()
     assert rows[1] == "moving supports,0.250,1234.50,80.00,0.333,7,0.500,12.000"
     assert rows[2].split(",")[2:5] == ["2000.00", "123.46", "0.514"]
+    assert built.props is None
+
+
+def test_the_table_of_a_grid_on_a_scaffold_tells_what_that_bears_as_long_as_it_is_there():
+    steps = (
+        told("raising", 0.5, 1e6, props=Props(push=9.0, pull=2.5, pulled=3, rope=0.25)),
+        told("lowering", 0.0, 1e6, props=Props(push=8.0, pull=4.0, pulled=2, rope=0.0)),
+        told("tightening", 1.0, 1e6),
+    )
+    built = Erection(steps, 240e6)
+    assert built.props == Props(push=9.0, pull=4.0, pulled=3, rope=0.25)
+    rows = [row.split(",") for row in built.table().splitlines()]
+    assert rows[0][8:] == [
+        "largest push of the scaffold [N]", "largest pull of the scaffold [N]", "crossings held down",
+        "largest force of a rope [N]",
+    ]  # fmt: skip
+    assert rows[1][8:] == ["9.000", "2.500", "3", "0.250"]
+    assert rows[3][8:] == ["", "", "", ""]
+
+
+def test_what_a_scaffold_bears_are_the_forces_at_its_props_and_what_ropes_leave_is_borne_by_pins():
+    """Node 0 is propped, 2 too; the ends 1 and 3 are drawn by ropes of 10 N/m, by 0.3 and 0.4 m."""
+    forces = np.zeros((4, 3))
+    forces[0, 2], forces[2, 2], forces[1], forces[3] = 7.0, -3.0, (3.0, 1.0, -2.0), (0.0, 4.0, 1.5)
+    place = np.zeros((4, 3))
+    place[1, 0], place[3, 1] = 0.3, 0.4
+    ropes = Ropes(np.array([1, 3]), np.zeros((2, 2)), 10.0)
+    props, ends = np.array([0, 2]), np.array([1, 3])
+    state = SimpleNamespace(positions=place)
+    drawn = Holding(0.0, ends, props, 0.1, ropes, drawn=True)
+    assert drawn.told(forces.copy(), state) == (pytest.approx(2.0), Props(7.0, 3.0, 1, pytest.approx(1.0)))
+    pinned = Holding(0.0, ends, props, 3.5, ropes, drawn=False)
+    assert pinned.told(forces.copy(), state) == (pytest.approx(np.hypot(1.0, 2.0)), Props(7.0, 3.0, 0, 0.0))
+    assert Holding(0.0, props, None, 0.1).told(forces.copy(), state) == (7.0, None)
 
 
 def shell(**other):
@@ -65,7 +100,7 @@ def test_a_step_tells_the_largest_of_each_and_the_height_over_the_lowest_support
         cables=lambda design: SimpleNamespace(tension=lambda state: np.array(design.tensions)),
     )
     monkeypatch.setattr(
-        erection,
+        erection_steps,
         "rod_stress",
         lambda _section, _beams, _forces: np.array([[5.0, 6.0], [4.0, 9.0], [8.0, 1.0]]),
     )
@@ -73,7 +108,7 @@ def test_a_step_tells_the_largest_of_each_and_the_height_over_the_lowest_support
     assembly = SimpleNamespace(beams=[beams], unbalanced=lambda state, load: forces - load)
     state = SimpleNamespace(positions=np.array([[0, 0, 1.5], [0, 0, 1.0], [0, 0, 4.0], [0, 0, 2.0]]))
     for tensions, tension in (([2.0, 7.0, 3.0], 7.0), ([], 0.0)):
-        site = erection._Site(given, SimpleNamespace(radius=0.01, tensions=tensions), assembly)
+        site = erection_steps.Site(given, SimpleNamespace(radius=0.01, tensions=tensions), assembly)
         found = site.step("lifting", 0.5, state, 0.0 * forces)
         assert (found.stage, found.share, found.height) == ("lifting", 0.5, 3.0)
         assert (found.stress, found.element, found.tension) == (9.0, 1, tension)
@@ -188,11 +223,12 @@ def tightened(monkeypatch, reached, *, rest=(0.9, 1.9, 2.9), start=(1.0, 2.5, 2.
     )  # fmt: skip
     monkeypatch.setattr(erection, "find_equilibrium", solve)
 
-    def site(_shell, design, _assembly):
+    def site(design, _assembly):
         return SimpleNamespace(step=lambda stage, share, _state, _load: (stage, share, design.rest_length[0]))
 
-    monkeypatch.setattr(erection, "_Site", site)
-    own = SimpleNamespace(shell=given, assembly=SimpleNamespace(with_parts=lambda parts: parts[1]))
+    own = SimpleNamespace(
+        shell=given, assembly=SimpleNamespace(with_parts=lambda parts: parts[1]), beside=site
+    )
     every = np.ones(3, dtype=bool)
     now, goal = sf.Design([7.0, 8.0, 9.0], every, 0.01), sf.Design(rest, every, 0.01)
     state = SimpleNamespace(positions=place)
@@ -258,8 +294,13 @@ def erected(monkeypatch, *, groups=None, load=None, borne=True, section=None, **
     given.net.edges = ()
 
     class Site:
-        def __init__(self, _shell, design, assembly=None):
-            self.design, self.assembly = design, SimpleNamespace(with_parts=lambda parts: "braced")
+        def __init__(self, _shell, design, assembly=None, holding=None):
+            self.shell, self.holding, self.design, self.assembly = (
+                _shell,
+                holding,
+                design,
+                assembly or SimpleNamespace(with_parts=lambda parts: "braced"),
+            )
 
         def step(self, stage, share, state, load):
             return stage, share, state, load[2, 2]
@@ -279,7 +320,7 @@ def erected(monkeypatch, *, groups=None, load=None, borne=True, section=None, **
         assert (drive.at(0.0)[2, 2], drive.at(0.4)[2, 2]) == (-2.0, -5.2)
         return SimpleNamespace(on_branch=borne, share=0.4, equilibrium=SimpleNamespace(state="loaded"))
 
-    monkeypatch.setattr(erection, "_Site", Site)
+    monkeypatch.setattr(erection, "Site", Site)
     monkeypatch.setattr(erection, "_taken_down", down)
     monkeypatch.setattr(erection, "_tightened", tighten)
     monkeypatch.setattr(erection, "advance", advance)

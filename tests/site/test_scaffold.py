@@ -1,0 +1,257 @@
+"""Shells raised by a scaffold, with edge beams and without."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError, NotConverged
+from shellform.gridshell.edge_beams import Bundle, EdgeBeam
+from shellform.net.edges import stand
+from shellform.site import scaffold
+from shellform.site.erection import erect
+from shellform.site.scaffold import Scaffold
+from shellform.structure.elements.sections import isotropic
+from shellform.structure.network import assemble
+from shellform.structure.solve.equilibrium import find_equilibrium
+from tests.net.edge_shells import barrel
+
+STAGES = ["raising", "drawing in", "pinning", "clamping", "lowering", "striking props", "tightening"]
+
+
+@pytest.fixture(scope="module")
+def arches():
+    """A barrel vault whose two arches hang on edge beams."""
+    surface = barrel()
+    net = sf.pull_net(surface, spacing=0.11, gap=0.002, angle=np.deg2rad(45.0), elements=2)
+    rod = sf.Rod.round(young=40e9, radius=0.0012, strength=600e6, density=2000.0)
+    joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
+    bundle = EdgeBeam(Bundle(0.0012, 19, 0.5, isotropic(young=40e9, density=2000.0, strength=600e6)))
+    return sf.brace(stand(net, surface), rod, joint, sf.Cable(stiffness=187.0), below=surface, edge=bundle)
+
+
+@pytest.fixture(scope="module")
+def erection(arches):
+    return erect(arches, arches.design())
+
+
+def unloaded(shell, design):
+    none = np.zeros((shell.node_count, 6))
+    return find_equilibrium(assemble(shell.network(design)), shell.target, none).state
+
+
+def of_stage(erection, stage):
+    return [step for step in erection.steps if step.stage == stage]
+
+
+def rods_only(shell, state):
+    """Forces (n, 6), N, that hold the grid without its edge beams in the state."""
+    beams = shell.beams(shell.rod.radius)
+    own = beams.chosen(np.flatnonzero(~(beams.of_kind("edge") | beams.of_kind("clamp"))))
+    every = np.ones((shell.node_count, 6), dtype=bool)
+    network = replace(shell.network(shell.unbraced()), beams=own, fixed=every)
+    return assemble(network).unbalanced(state, np.zeros((shell.node_count, 6)))
+
+
+def test_a_shell_with_edge_beams_is_raised_from_the_flat_grid_and_ends_in_the_design_s_equilibrium(
+    arches, erection
+):
+    assert list(dict.fromkeys(step.stage for step in erection.steps)) == STAGES
+    for stage in STAGES:
+        shares = [step.share for step in of_stage(erection, stage)]
+        assert shares == sorted(shares)
+        assert shares[-1] == pytest.approx(1.0)
+        assert shares[0] == pytest.approx(0.0, abs=1e-12) or stage == "tightening"
+    first, last = erection.steps[0], erection.steps[-1]
+    assert first.stress < 1.0
+    nodes = np.unique(arches.net.grid.rod_ends)
+    flat = first.state.positions[nodes]
+    assert np.ptp(flat[:, 2]) == pytest.approx(arches.net.grid.gap, rel=1e-6)
+    assert flat[:, 2].min() == pytest.approx(arches.target.positions[:, 2].min(), abs=1e-9)
+    beams = np.setdiff1d(np.arange(arches.node_count), nodes)
+    np.testing.assert_array_equal(first.state.positions[beams], arches.target.positions[beams])
+    expected = unloaded(arches, arches.design())
+    np.testing.assert_allclose(last.state.positions, expected.positions, atol=1e-8)
+    heights = [step.height for step in of_stage(erection, "raising")]
+    assert heights == sorted(heights)
+
+
+def test_unbraced_and_with_props_struck_it_stands_as_its_design_without_cables(arches, erection):
+    alone = of_stage(erection, "striking props")[-1]
+    expected = unloaded(arches, arches.unbraced())
+    np.testing.assert_allclose(alone.state.positions, expected.positions, atol=1e-8)
+    assert alone.props is None
+
+
+def test_on_the_way_up_rods_bear_hardly_more_than_when_they_are_up(erection):
+    raising = of_stage(erection, "raising")
+    stress = [step.stress for step in raising]
+    assert stress == sorted(stress)
+    assert erection.worst.stress < 1.1 * raising[-1].stress
+
+
+def test_a_raised_grid_is_held_by_its_props_from_below_and_its_ropes_from_the_side_alone(arches, erection):
+    props = scaffold._propped(arches, None)
+    clamps = np.vstack([line.clamps for line in arches.net.edges])[:, 1]
+    pinned = np.intersect1d(arches.net.supports, arches.net.grid.rod_ends)
+    ends = np.union1d(pinned, clamps)
+    step = of_stage(erection, "raising")[5]
+    force = rods_only(arches, step.state)
+    assert step.props.push == pytest.approx(force[props, 2].max(), rel=1e-6)
+    assert step.props.pull == pytest.approx(max(-force[props, 2].min(), 0.0), rel=1e-6)
+    assert step.props.rope == pytest.approx(np.linalg.norm(force[ends, :2], axis=1).max(), rel=1e-6)
+    assert step.reaction == pytest.approx(np.abs(force[ends, 2]).max(), rel=1e-6)
+    # At half of the way all are at half of their heights.
+    ground = arches.target.positions[:, 2].min()
+    final = of_stage(erection, "raising")[-1].state.positions[props, 2]
+    assert step.share == 0.5
+    np.testing.assert_allclose(step.state.positions[props, 2], 0.5 * (ground + final), atol=1e-9)
+    assert np.abs(force[:, :3].sum(axis=0)).max() < 1e-6 * step.props.push
+    force[props, 2] = 0.0
+    force[ends, :3] = 0.0
+    assert np.abs(force[np.unique(arches.net.grid.rod_ends)]).max() < 1e-5 * step.props.push
+
+
+def test_ends_are_on_their_seats_when_they_are_pinned_and_turned_as_on_the_target_before_they_are_clamped(
+    arches, erection
+):
+    clamps = np.vstack([line.clamps for line in arches.net.edges])[:, 1]
+    pinned = of_stage(erection, "pinning")[-1].state
+    np.testing.assert_allclose(pinned.positions[clamps], arches.target.positions[clamps], atol=1e-9)
+    turned = next(step for step in of_stage(erection, "clamping") if step.share == pytest.approx(0.5)).state
+    np.testing.assert_allclose(turned.positions[clamps], arches.target.positions[clamps], atol=1e-9)
+    alike = np.abs(np.sum(turned.quaternions[clamps] * arches.target.quaternions[clamps], axis=1))
+    np.testing.assert_allclose(alike, 1.0, atol=1e-12)
+
+
+def test_under_its_weight_the_shell_ends_where_the_weight_alone_brings_it_and_a_load_follows(arches):
+    weight, load = arches.point_load(0.2), arches.point_load(0.5)
+    done = erect(arches, arches.design(), weight=weight, load=load, step=0.5)
+    assert done.steps[-1].stage == "loading"
+    expected = sf.follow(arches, arches.design(), {"all": weight + load})["all"].equilibrium.state
+    np.testing.assert_allclose(done.steps[-1].state.positions, expected.positions, atol=1e-6)
+    heavier = of_stage(done, "raising")[-1].props
+    lighter = of_stage(erect(arches, arches.design(), step=0.5), "raising")[-1].props
+    assert heavier.push > lighter.push
+
+
+def test_cables_can_be_tightened_before_the_scaffold_goes_which_ends_in_the_same_shape(arches, erection):
+    done = erect(arches, arches.design(), tighten_first=True, step=0.5)
+    stages = list(dict.fromkeys(step.stage for step in done.steps))
+    assert stages == [*STAGES[:4], "tightening", "lowering", "striking props"]
+    assert of_stage(done, "tightening")[-1].props is not None
+    np.testing.assert_allclose(done.steps[-1].state.positions, erection.steps[-1].state.positions, atol=1e-8)
+
+
+def test_where_forces_that_go_in_proportion_would_let_the_shell_snap_places_are_let_down(
+    arches, erection, monkeypatch
+):
+    passed = Scaffold._passed
+
+    def snapping(self, site, stage, state, drive, *rest, **how):
+        if stage in ("lowering", "striking props") and drive.load.any():
+            raise NotConverged("snaps", state=state)
+        return passed(self, site, stage, state, drive, *rest, **how)
+
+    monkeypatch.setattr(Scaffold, "_passed", snapping)
+    done = erect(arches, arches.unbraced(), step=0.5)
+    let_down = of_stage(erection, "striking props")[-1].state
+    np.testing.assert_allclose(done.steps[-1].state.positions, let_down.positions, atol=1e-8)
+    assert of_stage(done, "lowering")[-1].props.push < 1e-5 * of_stage(done, "lowering")[0].props.push
+
+
+def test_a_shell_on_the_ground_ends_by_a_scaffold_as_by_supports_that_move_which_bend_rods_and_push_more(
+    shell,
+):
+    design = shell.design()
+    lifted, moved = (
+        erect(shell, design, by="scaffold", step=0.5),
+        erect(shell, design, by="supports", step=0.5),
+    )
+    assert list(dict.fromkeys(step.stage for step in lifted.steps)) == [
+        "raising", "drawing in", "pinning", "lowering", "tightening"
+    ]  # fmt: skip
+    np.testing.assert_allclose(lifted.steps[-1].state.positions, moved.steps[-1].state.positions, atol=1e-8)
+    assert max(step.reaction for step in lifted.steps) < max(step.reaction for step in moved.steps)
+    assert lifted.worst.stress < moved.worst.stress
+
+
+def test_a_scaffold_bears_every_second_crossing_by_its_lower_rod_where_the_target_is_no_steeper_than_60_degrees(
+    arches,
+):
+    lower, upper = arches.net.grid.crossing_nodes.T
+    second = arches.net.grid.lattice.sum(axis=1) % 2 == 0
+    assert scaffold._propped(arches, None).tolist() == lower[second].tolist()
+    assert scaffold._propped(arches, [upper[4], lower[2], lower[4]]).tolist() == sorted([lower[2], lower[4]])
+    steep = barrel(half=1.4)
+    net = sf.pull_net(steep, spacing=0.11, gap=0.002, angle=np.deg2rad(45.0), elements=2)
+    given = replace(arches, net=stand(net, steep), cable_ends=np.zeros((0, 2), dtype=np.int64))
+    lower = net.grid.crossing_nodes[net.grid.lattice.sum(axis=1) % 2 == 0, 0]
+    aside = np.abs(net.target.positions[lower, 1])
+    # On the circle of 0.5 m in radius 60° lie 0.433 m from the middle.
+    away = np.abs(aside - 0.5 * np.sin(np.pi / 3.0)) > 0.02
+    kept = np.isin(lower, scaffold._propped(given, None))
+    np.testing.assert_array_equal(kept[away], aside[away] < 0.43)
+    assert 0 < kept.sum() < len(lower)
+
+
+def test_a_single_prop_brings_up_a_small_vault(arches, erection):
+    middle = np.argmax(arches.net.crossings[:, 2])
+    done = erect(arches, arches.design(), props=arches.net.grid.crossing_nodes[middle], step=0.5)
+    np.testing.assert_allclose(done.steps[-1].state.positions, erection.steps[-1].state.positions, atol=1e-8)
+    assert done.worst.stress > erection.worst.stress
+
+
+def test_ways_up_that_can_t_be_are_refused(arches, shell):
+    design = arches.design()
+    with pytest.raises(InputError, match=r"erect\.by.*Known: supports, scaffold"):
+        erect(arches, design, by="balloon")
+    with pytest.raises(InputError, match=r"edge beams.*by a scaffold"):
+        erect(arches, design, by="supports")
+    for what in ({"way": [np.zeros((3, 3))]}, {"lift": np.zeros((arches.node_count, 6))}):
+        with pytest.raises(InputError, match=r"go with supports that move in.*Leave them out\.$"):
+            erect(arches, design, **what)
+    with pytest.raises(InputError, match="or erect by supports"):
+        erect(shell, shell.design(), by="scaffold", way=[np.zeros((3, 3))])
+    for what in ({"props": [0]}, {"tighten_first": True}):
+        with pytest.raises(InputError, match="go with a scaffold"):
+            erect(shell, shell.design(), by="supports", **what)
+    beam = int(arches.net.edges[0].nodes[1])
+    with pytest.raises(InputError, match=f"props.*is no node of a rod.*{beam}"):
+        erect(arches, design, props=[beam])
+
+
+def test_ways_up_that_end_on_the_way_say_where_and_what_helps(arches, monkeypatch):
+    design, load = arches.design(), arches.point_load(1.0)
+    with pytest.raises(NotConverged, match=r"bears 0\.\d\d of the weight by itself.*cables first"):
+        erect(arches, design, weight=3.0 * load, step=0.5)
+    with pytest.raises(NotConverged, match=r"by itself\. Give a smaller weight"):
+        erect(arches, design, weight=3.0 * load, step=0.5, tighten_first=True)
+    with pytest.raises(NotConverged, match=r"onto the scaffold.*stage 'pinning'.*Prop other crossings"):
+        erect(arches, design, weight=1000.0 * load, step=0.5)
+    monkeypatch.setattr(scaffold, "find_equilibrium", lost)
+    with pytest.raises(NotConverged, match=r"lie still on its scaffold.*smaller weight.*prop more crossings"):
+        erect(arches, design, step=0.5)
+
+
+def lost(_assembly, start, _load):
+    raise NotConverged("lost", state=start)
+
+
+def test_a_shell_let_down_to_another_shape_than_it_stands_in_is_refused(arches, monkeypatch):
+    def away(self, *_):
+        return replace(self.shell.target, positions=1.1 * self.shell.target.positions)
+
+    def snapping(self, site, stage, state, drive, *rest, **how):
+        if stage == "lowering":
+            if drive.load.any():
+                raise NotConverged("snaps", state=state)
+            return state
+        return passed(self, site, stage, state, drive, *rest, **how)
+
+    passed = Scaffold._passed
+    monkeypatch.setattr(Scaffold, "_standing", away)
+    monkeypatch.setattr(Scaffold, "_passed", snapping)
+    with pytest.raises(NotConverged, match=r"loses stability as what holds it goes, in 'lowering'"):
+        erect(arches, arches.design(), step=0.5)
