@@ -41,6 +41,10 @@ def render(
     film: Annotated[
         str | None, typer.Option(help="pour: the load coming on; erection: the grid rising from the ground.")
     ] = None,
+    by: Annotated[
+        str | None,
+        typer.Option(help="Of the erection: supports or scaffold, as shellform erect takes it."),
+    ] = None,
     width_mm: Annotated[
         float | None, typer.Option("--width-mm", help="Width in print, mm; letters and lines follow it.")
     ] = None,
@@ -62,7 +66,7 @@ def render(
         design=found.best if design == "best" else design,
         load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods,
         transparent=transparent,
-        kind=kind, film=film,
+        kind=kind, film=film, by=by,
         force_limit=force_limit, width_mm=width_mm, dpi=dpi, font_size=font_size,
     )  # fmt: skip
     if film is None:

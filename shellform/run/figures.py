@@ -54,7 +54,7 @@ class Wish:
     - `quantity`, one of QUANTITIES; `limit` of its colours, SI units; None: the case's for the deviation, 1
       for the utilisation, what the rods bear for their curvature, else the largest.
     - `force_limit`, N, of the cables' colours; 0: the largest.
-    - `paper` that it is for; None: a screen.
+    - `paper` that it is for; None: a screen. `by`: as `erect` takes it, of a film.
     - `endings` of the files; the rest as in panel.py.
     """
 
@@ -69,6 +69,7 @@ class Wish:
     endings: tuple[str, ...] = (".png",)
     force_limit: float = 0.0
     paper: Paper | None = None
+    by: str | None = None
 
 
 def wish(
@@ -87,6 +88,7 @@ def wish(
     width_mm: float | None = None,
     dpi: float | None = None,
     font_size: float | None = None,
+    by: str | None = None,
 ) -> Wish:
     """A wish as the command line says it: `size` as WIDTHxHEIGHT, the file's `kind` without a dot. Raises
     InputError for bad options.
@@ -103,6 +105,13 @@ def wish(
             where="--film",
             value="--transparent" if transparent else quantity,
             remedy="Leave --transparent out." if transparent else f"Films show {filmed}.",
+        )
+    if by is not None and film != "erection":
+        raise InputError(
+            "says how a grid is erected",
+            where="--by",
+            value=by,
+            remedy="Give --film erection, or leave it out.",
         )
     if quantity is not None:
         require_known(quantity, QUANTITIES, where="--quantity", what="is nothing to draw")
@@ -124,6 +133,7 @@ def wish(
         endings=endings,
         force_limit=force_limit or 0.0,
         paper=paper,
+        by=by,
     )
 
 

@@ -2,8 +2,8 @@
 rising from the ground (`erection`).
 
 The frames are equilibria. A pour goes from the state before along the documented path (loading.py) and its
-frames lie evenly over the load, states in between on straight lines; erection shows every step of
-erection.py.
+frames lie evenly over the load, states in between on straight lines; erection shows the steps of
+erection.py, few of those stages in which the grid hardly moves.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from shellform.records.progress import Event, Report, unheard
 from shellform.run.figures import Wish, look_of, titled
 from shellform.run.folder import Run
 from shellform.site.erection import erect
+from shellform.site.erection_steps import ErectionStep
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import Equilibrium
@@ -27,6 +28,8 @@ from shellform.structure.solve.loading import apply_load
 from shellform.written import make_folder
 
 _FRAMES = 24  # of a stage
+_BRIEF = 6  # steps to a frame where little moves
+_LONG = ("raising", "moving supports", "tightening", "loading")  # stages in which much does
 _SIZE = (960, 600)  # pixels
 
 
@@ -124,7 +127,7 @@ def _erection(run: Run, name: str, wish: Wish, report: Report) -> list[Any]:
     report(Event("film", "following the grid from the ground"))
     design, shell = run.designs[name], run.shell_of(name)
     load = run.loads[wish.load] if wish.load else None
-    steps = erect(shell, design, load=load, step=1.0 / _FRAMES).steps
+    steps = _shown(erect(shell, design, by=wish.by, load=load, step=1.0 / _FRAMES).steps)
     rising = [step for step in steps if step.stage not in ("tightening", "loading")]
     pairs = rising[-1].state.positions[shell.cable_ends]
     slack = np.maximum(
@@ -148,3 +151,12 @@ def _erection(run: Run, name: str, wish: Wish, report: Report) -> list[Any]:
             )
         )
     return panels
+
+
+def _shown(steps: Sequence[ErectionStep]) -> list[ErectionStep]:
+    """Steps that are frames: all of the long stages, and the last of each few of the others."""
+    shown = list[ErectionStep]()
+    for stage in dict.fromkeys(step.stage for step in steps):
+        own = [step for step in steps if step.stage == stage]
+        shown += own if stage in _LONG else own[::-_BRIEF][::-1]
+    return shown

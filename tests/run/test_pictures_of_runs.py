@@ -3,13 +3,14 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from shellform.case.case import load_case
-from shellform.errors import InputError
+from shellform.errors import InputError, NotConverged
 from shellform.output.pictures.panel import scale_end
 from shellform.problem.paths import deviations
 from shellform.run import films
@@ -119,6 +120,28 @@ def test_the_pour_and_the_erection_are_filmed_from_the_first_state_to_the_last(r
     assert Image.open(rise).n_frames > 25
 
 
+def test_a_film_of_an_erection_by_a_scaffold_shows_few_of_the_steps_in_which_little_moves(run, monkeypatch):
+    def step(stage, share):
+        return SimpleNamespace(stage=stage, share=share)
+
+    steps = [step("raising", k / 24) for k in range(25)]
+    steps += [step("pinning", k / 24) for k in range(25)] + [step("tightening", k / 24) for k in range(1, 25)]
+    shown = films._shown(steps)
+    assert shown[:25] == steps[:25]
+    assert shown[30:] == steps[50:]
+    assert [each.share for each in shown[25:30]] == [0.0, 0.25, 0.5, 0.75, 1.0]
+    asked = []
+
+    def erect(shell, design, *, by, load, step):
+        asked.append(by)
+        raise NotConverged("enough")
+
+    monkeypatch.setattr(films, "erect", erect)
+    with pytest.raises(NotConverged, match="enough"):
+        draw_film(run, "erection", Wish("initial", by="scaffold", endings=(".gif",)))
+    assert asked == ["scaffold"]
+
+
 def test_a_shell_poured_in_stages_is_filmed_through_all_of_them(run, monkeypatch):
     text = (
         (ROOT / "scripts/full_size_poured.toml")
@@ -160,6 +183,7 @@ def test_the_options_of_the_command_become_a_wish():
             "can't be filmed.*Films show deviation, utilisation, curvature, shear",
         ),
         ({"film": "pour", "transparent": True}, "can't be filmed.*Leave --transparent out"),
+        ({"film": "pour", "by": "scaffold"}, r"--by: says how a grid is erected.*--film erection"),
         ({"film": "pour", "kind": "png"}, "Known: gif, mp4"),
         ({"kind": "gif"}, "Known: png, svg, pdf"),
         ({"quantity": "colour"}, "Known: deviation, utilisation, curvature, shear, spring, mode, history"),
