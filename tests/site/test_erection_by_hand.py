@@ -58,7 +58,7 @@ def test_what_a_scaffold_bears_are_the_forces_at_its_props_and_what_ropes_leave_
     place[1, 0], place[3, 1] = 0.3, 0.4
     ropes = Ropes(np.array([1, 3]), np.zeros((2, 2)), 10.0)
     props, ends = np.array([0, 2]), np.array([1, 3])
-    state = SimpleNamespace(positions=place)
+    state = SimpleNamespace(positions=place, tail=None)
     drawn = Holding(0.0, ends, props, 0.1, ropes, drawn=True)
     assert drawn.told(forces.copy(), state) == (pytest.approx(2.0), Props(7.0, 3.0, 1, pytest.approx(1.0)))
     pinned = Holding(0.0, ends, props, 3.5, ropes, drawn=False)

@@ -136,6 +136,14 @@ def test_under_its_weight_the_shell_ends_where_the_weight_alone_brings_it_and_a_
     assert heavier.push > lighter.push
 
 
+def test_a_weight_that_rounding_hides_beside_the_rods_ends_no_way_up(arches, erection):
+    weight = np.zeros((arches.node_count, 6))
+    weight[arches.net.supports[0], 2] = -1e-4
+    done = erect(arches, arches.design(), weight=weight, step=0.5)
+    last = erection.steps[-1].state.positions
+    np.testing.assert_allclose(done.steps[-1].state.positions, last, atol=1e-7)
+
+
 def test_cables_can_be_tightened_before_the_scaffold_goes_which_ends_in_the_same_shape(arches, erection):
     done = erect(arches, arches.design(), tighten_first=True, step=0.5)
     stages = list(dict.fromkeys(step.stage for step in done.steps))

@@ -5,7 +5,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.structure.elements.ropes import Ropes
-from shellform.structure.elements.state import at_rest
+from shellform.structure.elements.state import State, at_rest, extended
 
 PLACE = np.array([[0.0, 0.0, 5.0], [1.0, 2.0, -3.0], [4.0, 4.0, 4.0]])
 ROPES = Ropes([2, 0], [[1.0, 0.0], [0.0, 0.5]], 8.0)
@@ -34,6 +34,17 @@ def test_forces_and_tangents_of_ropes_are_derivatives_of_their_energy_and_forces
             assert (ends[0].energy - ends[1].energy)[rope] / (2.0 * step) == pytest.approx(force)
             change = (ends[0].force - ends[1].force)[rope] / (2.0 * step)
             np.testing.assert_allclose(change, full[:, axis], atol=1e-8)
+
+
+def test_ropes_know_what_coordinates_have_beyond_double_precision():
+    place = extended(at_rest(PLACE))
+    tail = place.tail.copy()
+    tail[2, 0] = 0.25  # far more than a tail is, to be seen
+    found = ROPES.evaluate_extended(State(place.positions, place.quaternions, tail), tangent=True)
+    np.testing.assert_allclose(found.force, [[26.0, 32.0], [0.0, -4.0]])
+    np.testing.assert_array_equal(found.tangent[..., 0], [[8.0, 0.0, 8.0]] * 2)
+    np.testing.assert_array_equal(found.tangent[..., 1], 0.0)
+    assert ROPES.evaluate_extended(place, tangent=False).tangent is None
 
 
 def test_ropes_have_a_place_each():

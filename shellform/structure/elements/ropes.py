@@ -39,7 +39,10 @@ class Ropes(Record):
 
     def force(self, state: State) -> Reals:
         """Forces (k, 2), N, that stretch the ropes."""
-        return np.asarray(self.stiffness * (state.positions[self.nodes, :2] - self.places))
+        stretch = state.positions[self.nodes, :2] - self.places
+        if state.tail is not None:
+            stretch += state.tail[self.nodes, :2]
+        return np.asarray(self.stiffness * stretch)
 
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
         """Energy (k,) J, forces (k, 2) N, packed lower tangents (k, 3) N/m, filled `into`."""
@@ -50,3 +53,12 @@ class Ropes(Record):
         packed = np.empty((len(force), 3)) if into is None else into
         packed[:] = self.stiffness * np.array([1.0, 0.0, 1.0])
         return Evaluation(energy, force, packed)
+
+    def evaluate_extended(self, state: State, *, tangent: bool) -> Evaluation:
+        """As `evaluate` at a state with a tail, tangents (k, 3, 2) with all their digits."""
+        found = self.evaluate(state, tangent=tangent)
+        if found.tangent is None:
+            return found
+        return Evaluation(
+            found.energy, found.force, np.stack([found.tangent, np.zeros_like(found.tangent)], axis=2)
+        )

@@ -28,6 +28,7 @@ from shellform.compiled import njit
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.double_double import minus, over, plus, times
+from shellform.structure.elements.ropes import Ropes
 from shellform.structure.elements.state import State, extended
 from shellform.structure.solve.assembly import Assembly, Balance, add_forces
 from shellform.structure.solve.chords import ChordKeeper
@@ -40,7 +41,7 @@ _SMALL = 1e-2  # rad, below which a series of two terms is right to the last dig
 
 
 class ExtendedAssembly(Assembly):
-    """The same as `plain`, a model of beams and cables, with twice the digits."""
+    """The same as `plain`, a model of beams, cables and ropes, with twice the digits."""
 
     def __init__(self, plain: Assembly) -> None:
         self.__dict__.update(plain.__dict__)
@@ -68,7 +69,7 @@ class ExtendedAssembly(Assembly):
         for part, dofs in zip(self.parts, self._dofs, strict=True):
             if not len(dofs):
                 continue
-            assert isinstance(part, Beams | Cables)
+            assert isinstance(part, Beams | Cables | Ropes)
             result = part.evaluate_extended(state, tangent=tangent)
             energy += float(result.energy.sum())
             turned = max(turned, result.turned)
@@ -90,7 +91,7 @@ def with_twice_the_digits(assembly: Assembly) -> Assembly | None:
     """The same assembly with twice the digits; None where it has them already or its parts can't."""
     if isinstance(assembly, ExtendedAssembly):
         return None
-    if not all(isinstance(part, Beams | Cables) for part in assembly.parts):
+    if not all(isinstance(part, Beams | Cables | Ropes) for part in assembly.parts):
         return None
     if assembly not in _MADE:
         _MADE[assembly] = ExtendedAssembly(assembly)
