@@ -139,3 +139,14 @@ def test_of_a_section_without_a_design_no_numbers_are_told(known, why, told):
     ) == told  # fmt: skip
     assert (found.rod_radius, found.rod_mass, found.rounded_up) == (0.004, 12.0, True)
     assert (found.feasible, found.why_not) == (known, why)
+
+
+def test_evaluations_beyond_those_asked_for_are_counted_as_asked_for():
+    desk = Desk()
+    tell = optimising._telling(desk, "polishing", 80)
+    for evaluation in (79, 86):
+        tell(SimpleNamespace(evaluation=evaluation))
+    assert [text for text, _ in desk.said] == [
+        "polishing: evaluation 79/80 at most",
+        "polishing: evaluation 86/86 at most",
+    ]
