@@ -79,7 +79,8 @@ LEAST_THICKNESS = 0.015  # m: a first layer of sprayed concrete
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3  # tried, one after the other
 _STEPS = 4  # sections tried on one net
-_NARROWED = 6  # where less stiff ones fell, deeper ones broke, and some lie between
+# where less stiff ones fell, deeper ones broke, and some lie between; two layers of thinner ones come before
+_NARROWED = 6
 _TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyond it no others are tried
 Say = Callable[[str], None]
 
@@ -242,8 +243,9 @@ class _Search:
             at = after(placed.net, possible, tried)
         else:
             tried, at = {}, first_choice(placed.net, self.surface, spacing, possible, needed)
+        narrows = not _more_come(possible[-1], self.layers)
         while at not in tried:
-            ended = len(tried) >= (_NARROWED if narrowed(possible, tried) else _STEPS)
+            ended = len(tried) >= (_NARROWED if narrows and narrowed(possible, tried) else _STEPS)
             if tried and (ended or self.allowance.over):
                 break
             result = self._stands(placed, possible[at], spacing, thickness)
@@ -302,7 +304,7 @@ class _Search:
         """The design with these rods and this load, and the lightest edge beams with which it stands. Single
         rods of which drawn structures fall give way to two layers, which cost no more and spare more than
         heavier edge beams."""
-        spare = layers_of(choice.section) < self.layers[-1]
+        spare = _more_come(choice, self.layers)
         for edge in edge_choices(choice)[self.lightest : self.lightest + HEAVY]:
             result = self.with_edges(placed, choice, edge, spacing, thickness)
             if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result)):
@@ -386,3 +388,8 @@ class _Search:
         if self.best is None or failure.near(NEEDED) >= self.best.near(NEEDED):
             self.best = failure
         return failure
+
+
+def _more_come(choice: RodChoice, layers: Sequence[int]) -> bool:
+    """Whether rods in more of the `layers` are tried after this choice's."""
+    return layers_of(choice.section) < layers[-1]

@@ -431,3 +431,20 @@ def test_a_search_tells_the_crossings_of_the_net_that_it_proposes(monkeypatch):
     )  # fmt: skip
     assert _Search._net(search, 0.5, 0.02).net is stood
     assert said == ["net at 30° and 0.5 m: 257 crossings, rods bend to a radius of 257 m"]
+
+
+@pytest.mark.parametrize(
+    ("narrowed", "layers", "trials"), [(True, (1, 2), 4), (True, (1,), 6), (False, (1,), 4)]
+)
+def test_sections_are_narrowed_down_only_where_no_more_layers_come(monkeypatch, narrowed, layers, trials):
+    """Two layers of thinner rods leave fewer cables than single rods that hardly stand."""
+    row = [Choice(sf.Rod.round(young=40e9, radius=radius).section) for radius in np.linspace(0.01, 0.02, 9)]
+    search = _Search("dome", DesignWish(layers=None), lambda text: None, Allowance(1.0))
+    search.layers, tried = layers, []
+    monkeypatch.setattr(search, "_stands", lambda placed, choice, *_: tried.append(choice) or "falls")
+    monkeypatch.setattr(first_design, "hopeless", lambda *_: False)
+    monkeypatch.setattr(first_design, "first_choice", lambda *_: 0)
+    monkeypatch.setattr(first_design, "after", lambda net, possible, tried: len(tried))
+    monkeypatch.setattr(first_design, "narrowed", lambda *_: narrowed)
+    assert search._first_that_stands(SimpleNamespace(net=None), row, 0.5, 0.05) is None
+    assert tried == row[:trials]
