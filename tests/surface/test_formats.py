@@ -166,6 +166,19 @@ def test_a_force_diagram_is_no_shell_unless_it_is_asked_for(tmp_path):
     np.testing.assert_allclose(asked.size, np.array(SIZE) * 2)
 
 
+def test_compas_meshes_keep_their_numbers_where_a_force_diagram_comes_before_them(tmp_path):
+    file, own = tmp_path / "a.json", [compas_mesh(k * POINTS, QUADS)["data"] for k in (3, 1, 2)]
+    file.write_text(json.dumps([{**own[0], "attributes": {"name": "ForceDiagram"}}, *own[1:]]))
+    with pytest.raises(InputError, match=r"2 meshes.*among mesh 2, mesh 3\.$"):
+        read_surface(file)
+    for name, times in (("mesh 2", 1), ("mesh 3", 2), ("ForceDiagram", 3)):
+        np.testing.assert_allclose(read_surface(file, name=name).size, np.array(SIZE) * times)
+    file.write_text(json.dumps([{**own[0], "attributes": {"name": "ForceDiagram"}}, own[1]]))
+    alone = read_surface(file)
+    np.testing.assert_allclose(alone.size, SIZE)
+    assert "mesh 2" not in " ".join(alone.mended)
+
+
 def test_what_has_vertices_and_no_faces_in_a_compas_file_is_no_mesh(tmp_path):
     """A form diagram's network beside the mesh, as sessions hold them."""
     network = {"vertex": {"0": {"x": 0.0}, "1": {"x": 1.0}}, "edge": {"0": {"1": {}}}}

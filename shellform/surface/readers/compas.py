@@ -3,9 +3,8 @@
 A file is one mesh, or a session with a scene of several; each is found by its `vertex` and `face` tables, in
 the layouts of COMPAS 0 and 1 (`dva`, faces as lists) and 2 (`default_vertex_attributes`, `facedata`). Of a
 RHINOVault session the `ThrustDiagram` is the shell, and a `ForceDiagram`, whose coordinates are forces, is
-none; faces marked as without load are openings. A file
-without a mesh may hold a network (`node` and `edge` tables, as force density programs write): the faces
-between its lines are the shell.
+none; faces marked as without load are openings. A file without a mesh may hold a network (`node` and `edge`
+tables, as force density programs write): the faces between its lines are the shell.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ def read_compas(file: Path, choice: Choice) -> Draft:
     if not choice.name and not choice.layer and named:
         found = named[-1:]
     else:
-        found = _told_apart([each for each in found if choice.name or each[0] != _FORCES] or found)
+        found = _told_apart(found, but=None if choice.name else _FORCES)
     if not choice.name and len(found) > 1:
         raise InputError(
             f"holds {len(found)} {'networks' if networks else 'meshes'}",
@@ -101,15 +100,19 @@ def _tables(data: Any, name: str, points: str, joins: str) -> Iterator[tuple[str
                 yield from _tables(each, called or key, points, joins)
 
 
-def _told_apart(found: list[tuple[str, dict[str, Any]]]) -> list[tuple[str, dict[str, Any]]]:
-    """The objects by names of which none is empty and none there twice, where there are several."""
+def _told_apart(
+    found: list[tuple[str, dict[str, Any]]], *, but: str | None
+) -> list[tuple[str, dict[str, Any]]]:
+    """The objects by names of which none is empty and none there twice, where there are several; without
+    those called `but`, unless all are. Each keeps its number whether these are left out or not."""
     times = Counter(name for name, _ in found)
-    if len(found) < 2 or (max(times.values()) < 2 and "" not in times):
-        return found
-    return [
-        (name if name and times[name] < 2 else f"{name or 'mesh'} {k}", table)
+    alike = len(found) > 1 and (max(times.values()) > 1 or "" in times)
+    apart = [
+        (name if not alike or (name and times[name] < 2) else f"{name or 'mesh'} {k}", table)
         for k, (name, table) in enumerate(found, 1)
     ]
+    kept = [k for k, (name, _) in enumerate(found) if name != but] or list(range(len(found)))
+    return [found[k] for k in kept] if len(kept) == 1 else [apart[k] for k in kept]
 
 
 def _part(name: str, table: dict[str, Any]) -> tuple[MeshObject, int]:
