@@ -218,9 +218,9 @@ def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least
     points, faces = surface.vertices, surface.triangles
     top = float(points[:, 2].max())
     level = float(points[:, 2].min()) if ground is None else ground
-    require_number(level, below=top, where="ground", give="metres below its top, or leave it out")
-    held = np.zeros(len(points), dtype=bool)
-    edge = np.concatenate(surface.boundary)
+    give = "a surface that rises" if ground is None else "metres below its top, or leave it out"
+    require_number(level, below=top, where="ground", give=give)
+    edge, held = np.concatenate(surface.boundary), np.zeros(len(points), dtype=bool)
     held[edge] = points[edge, 2] < level + 0.01 * (top - level)
     if not held.any():
         raise InputError(

@@ -2,6 +2,7 @@
 alone.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -297,6 +298,9 @@ def test_the_thrust_shell_nearest_to_one_is_itself_and_to_a_dome_is_near():
         nearest_thrust_shell(dome, ground=-5.0)
     with pytest.raises(InputError, match=r"ground: must be below 0\.2.*metres below its top"):
         nearest_thrust_shell(dome, ground=50.0)
+    flat = replace(dome, vertices=dome.vertices * [1.0, 1.0, 0.0])
+    with pytest.raises(InputError, match=r"ground: must be below 0.*Give a surface that rises\."):
+        nearest_thrust_shell(flat)
 
 
 @pytest.mark.parametrize("ending", ["step", "igs", "brep"])
