@@ -112,7 +112,7 @@ def test_under_moments_that_turn_nodes_the_relaxation_is_given_up_sooner_and_the
     assert drives == [(0.0, 10.0, 0.5, 1e-7), (10.0, 20.0, 0.5, 1e-7)]
     assert walk.spent == 2 * 59
     assert (walk.followed_from, walk.left_at, walk.on_branch) == (0.0, 4.0, False)
-    assert [each.factor for each in walk.behind[1].waypoints] == [3.0, 4.0]
+    assert [(each.factor, each.factorisations) for each in walk.behind[1].waypoints] == [(3.0, 4), (4.0, 5)]
     assert told == [(1.0, 54), (2.0, 59), (2.0, 59), (3.0, 113), (4.0, 118), (4.0, 118)]
     assert [("semi-tangential" in each, "from load factor 0 on" in each) for each in walk.warnings()[1:]] == [
         (True, False),

@@ -63,7 +63,7 @@ def part(monkeypatch):
         begin=1.0,
         end=3.0,
         tolerance=1e-7,
-        report=lambda share, found: asked.seen.append((share, found.state)),
+        report=lambda share, found: asked.seen.append((share, found.state, found.factorisations)),
     )
     return asked
 
@@ -76,7 +76,7 @@ def test_where_the_path_comes_to_the_whole_load_the_branch_has_not_ended(part):
     part.points = [point(0.5, spent=6), point(1.0, spent=11)]
     found = part.settled()
     assert (found.share, found.state, found.factorisations) == (1.0, "at 1.0", 51)
-    assert part.seen == [(0.5, "half"), (0.75, "at 0.5"), (1.0, "at 1.0")]
+    assert part.seen == [(0.5, "half", 1), (0.75, "at 0.5", 5), (1.0, "at 1.0", 5)]  # each one's own
     ((start, begin, end, named),) = part.paths
     assert (start, begin, end) == ("half", 8.0, 12.0)
     assert named == {"first": 1 / 32, "tolerance": 1e-7, "events": False, "heeding": True}
@@ -86,7 +86,7 @@ def test_where_the_path_meets_an_unstable_point_the_branch_has_ended(part):
     part.points = [point(0.5, spent=6), point(0.7, stable=False, spent=8), point(1.0, spent=11)]
     found = part.settled()
     assert (found.share, found.state, found.factorisations) == (0.5, "half", 48)
-    assert part.seen == [(0.5, "half")]
+    assert part.seen == [(0.5, "half", 1)]
 
 
 def test_where_the_path_can_not_be_followed_it_tells_nothing(part):

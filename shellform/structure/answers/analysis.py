@@ -269,14 +269,15 @@ class _Analysis:
         if self.followed_from is None:
             self.followed_from = before
         points = follow(self.assembly, self.state, rest, tolerance=self.tolerance, heeding=True)
-        last = next(points)
+        last, spent = next(points), 0
         for last in points:
-            factor = before + last.factor * change
-            if last.event or not last.equilibrium.stable:
+            factor, found = before + last.factor * change, last.equilibrium
+            if last.event or not found.stable:
                 self._left(factor)
-            waypoints.append(Waypoint(factor, last.equilibrium.factorisations, last.equilibrium.stable))
+            waypoints.append(Waypoint(factor, found.factorisations - spent, found.stable))
+            spent = found.factorisations
             if self.progress is not None:
-                self.progress(factor, self.spent + wasted + last.equilibrium.factorisations)
+                self.progress(factor, self.spent + wasted + spent)
         return last.equilibrium
 
     def path(self, lead: Lead | None, parts: int) -> None:

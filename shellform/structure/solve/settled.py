@@ -71,10 +71,12 @@ def _along_path(
         for point in follow(
             assembly, way.state, rest, first=first, tolerance=tolerance, events=False, heeding=True
         ):
-            spent = point.equilibrium.factorisations
-            if not point.equilibrium.stable:
+            found = point.equilibrium
+            before, spent = spent, found.factorisations
+            if not found.stable:
                 break
-            passed.append((share + point.factor * (1.0 - share), point.equilibrium))
+            own = replace(found, factorisations=spent - before)  # a path counts from its start
+            passed.append((share + point.factor * (1.0 - share), own))
     except NotConverged as error:
         spent = error.iterations
     spent += way.factorisations
