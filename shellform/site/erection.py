@@ -74,12 +74,11 @@ def erect(
     tightening or the load ends it.
     """
     require_number(step, least=_LEAST, most=1.0, where="erect.step", give="a share of the way, such as 0.1")
-    by = _way_up(
-        shell,
-        by,
-        supports_only=len(way) > 0 or lift is not None,
-        scaffold_only=props is not None or tighten_first,
-    )
+    moving = [name for name, given in (("way", len(way) > 0), ("lift", lift is not None)) if given]
+    propped = [
+        name for name, given in (("props", props is not None), ("tighten_first", tighten_first)) if given
+    ]
+    by = _way_up(shell, by, moving=moving, propped=propped)
     nodes = shell.node_count
     none = np.zeros((nodes, 6))
     own, carried, last = (
@@ -99,14 +98,14 @@ def erect(
     else:
         steps, braced = scaffold.up(), scaffold.site(now) if tighten_first else free
         if not tighten_first:
-            steps += scaffold.taken_away(unbraced, steps[-1].state)
+            steps += scaffold.taken_away(unbraced, steps[-1].state, braced_later=len(teams) > 0)
         state = steps[-1].state
     for number, team in enumerate(teams, 1):
         stage = "tightening" if len(teams) == 1 else f"tightening group {number}"
         now, state, more = _tightened(braced, now, design, state, team, own, stage, step)
         steps += more
     if scaffold is not None and tighten_first:
-        steps += scaffold.taken_away(now, state)
+        steps += scaffold.taken_away(now, state, braced_later=False)
         state = steps[-1].state
     if last.any():
         there = _locked(locked, free, now, state)
@@ -142,10 +141,11 @@ def _loaded(site: Site, state: State, weight: Reals, load: Reals, step: float) -
     return steps
 
 
-def _way_up(shell: Gridshell, by: str | None, *, supports_only: bool, scaffold_only: bool) -> str:
-    """The way that the grid goes up. Raises InputError for what doesn't go with it."""
+def _way_up(shell: Gridshell, by: str | None, *, moving: Sequence[str], propped: Sequence[str]) -> str:
+    """The way that the grid goes up, where what is given goes with supports that move (`moving`) or with a
+    scaffold (`propped`). Raises InputError for what doesn't go with it."""
     edges = len(shell.net.edges)
-    usual = SCAFFOLD if edges or scaffold_only else SUPPORTS
+    usual = SCAFFOLD if edges or propped else SUPPORTS
     way = usual if by is None else by
     require_known(way, WAYS_UP, where="erect.by", what="is no way up")
     if way == SUPPORTS and edges:
@@ -155,19 +155,19 @@ def _way_up(shell: Gridshell, by: str | None, *, supports_only: bool, scaffold_o
             value=way,
             remedy="Erect it by a scaffold.",
         )
-    if way == SCAFFOLD and supports_only:
+    if way == SCAFFOLD and moving:
         raise InputError(
-            "go with supports that move in",
+            "goes with supports that move in",
             where="erect",
-            value="way, lift",
-            remedy="Leave them out." if edges else "Leave them out, or erect by supports.",
+            value=", ".join(moving),
+            remedy="Leave it out." if edges or propped else "Leave it out, or erect by supports.",
         )
-    if way == SUPPORTS and scaffold_only:
+    if way == SUPPORTS and propped:
         raise InputError(
-            "go with a scaffold",
+            "goes with a scaffold",
             where="erect",
-            value="props, tighten_first",
-            remedy="Leave them out, or erect by a scaffold.",
+            value=", ".join(propped),
+            remedy="Leave it out." if moving else "Leave it out, or erect by a scaffold.",
         )
     return way
 
@@ -268,11 +268,12 @@ def _tightened(
         if not reached:
             width *= 0.5
             if width < _SMALLEST:
+                first = " or before a scaffold goes (--by scaffold --tighten-first)"
+                held = site.holding is not None and site.holding.props is not None
                 raise NotConverged(
                     f"At {share:.2f} of the stage {stage!r} the grid loses stability",
                     state=state,
-                    remedy="Tighten the cables in other groups, or before a scaffold goes (--by scaffold, "
-                    "--tighten-first).",
+                    remedy=f"Tighten the cables in other groups{'' if held else first}.",
                 )
             continue
         share, state, now = then, found.state, trial

@@ -136,26 +136,32 @@ class Scaffold:
         """The same without scaffold and props."""
         return self._with_cables(design, self._fixed(props=False, beams=False), None)
 
-    def taken_away(self, design: Design, state: State) -> list[ErectionStep]:
-        """Steps from a state of `site` to the one in which the design's shell stands by itself. Raises
-        NotConverged where it doesn't.
+    def taken_away(self, design: Design, state: State, *, braced_later: bool) -> list[ErectionStep]:
+        """Steps from a state of `site` to the one in which the design's shell stands by itself; cables may be
+        `braced_later`. Raises NotConverged where it doesn't stand.
         """
         held, on_beams = self.site(design), self._fixed(props=False, beams=True)
         lowered = self._with_cables(design, on_beams, self.props)
-        steps = self._let_down("lowering", state, held, lowered)
+        lost = ("The grid loses stability as what holds it goes", self._standing_better(braced_later))
+        steps = self._let_down("lowering", state, held, lowered, lost)
         if len(self.on_beams):
-            struck = self._with_cables(design, self._fixed(props=False, beams=False), None)
             held = self._with_cables(design, on_beams, None)
-            steps += self._let_down("striking props", steps[-1].state, held, struck)
+            steps += self._let_down("striking props", steps[-1].state, held, self.standing(design), lost)
         return steps
 
-    def _let_down(self, stage: str, state: State, held: Site, freed: Site) -> list[ErectionStep]:
+    def _standing_better(self, braced_later: bool) -> str:
+        """What to do where the shell doesn't stand by itself."""
+        ways = ["tighten the cables first (--tighten-first)"] if braced_later else []
+        ways += ["give a smaller weight"] if self.weight.any() else []
+        return f"{', or '.join(ways) or 'choose stiffer rods'}.".capitalize()
+
+    def _let_down(
+        self, stage: str, state: State, held: Site, freed: Site, lost: tuple[str, str]
+    ) -> list[ErectionStep]:
         """Steps from the state that is `held` to the one that is `freed`: the forces that go fall in
         proportion, which bends rods little, or where that isn't stable the places do, to where nothing is
-        borne there."""
+        borne there. Raises NotConverged with what is `lost` and what to do."""
         steps = list[ErectionStep]()
-        first = "" if freed.design.present.any() else "Tighten the cables first (--tighten-first), or g"
-        lost = ("The grid loses stability as what holds it goes", f"{first or 'G'}ive a smaller weight.")
         try:
             self._passed(freed, stage, state, self._handed(freed, state), (0.0, 1.0), steps, lost)
         except NotConverged:
@@ -173,6 +179,8 @@ class Scaffold:
         """The shell when what held it has gone: next to the target, then under the weight."""
         none = np.zeros_like(self.weight)
         found = find_equilibrium(freed, self.shell.target, none)
+        if not found.stable:
+            raise NotConverged(f"{lost[0]}: it doesn't stand by itself", state=found.state, remedy=lost[1])
         loaded = advance(freed, found.state, Drive(self.weight, none, none), stay=True)
         if not loaded.on_branch:
             raise NotConverged(

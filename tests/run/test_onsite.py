@@ -338,7 +338,7 @@ def test_bad_options_are_refused(folder, tmp_path):
     refused(shellform("erect", tmp_path), "is no run folder")
     refused(shellform("erect", folder, "--step", 0), "erect.step")
     refused(shellform("erect", folder, "--by", "balloon"), "Known: supports, scaffold")
-    refused(shellform("erect", folder, "--by", "supports", "--tighten-first"), "go with a scaffold")
+    refused(shellform("erect", folder, "--by", "supports", "--tighten-first"), "goes with a scaffold")
     refused(shellform("erect", folder, "--step", "1e-300"), "erect.step: must be between 0.0001 and 1")
     refused(shellform("calibrate", folder), "Missing argument")
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["designs"].keys() == {

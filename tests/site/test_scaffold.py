@@ -218,13 +218,21 @@ def test_ways_up_that_can_t_be_are_refused(arches, shell):
     with pytest.raises(InputError, match=r"edge beams.*by a scaffold"):
         erect(arches, design, by="supports")
     for what in ({"way": [np.zeros((3, 3))]}, {"lift": np.zeros((arches.node_count, 6))}):
-        with pytest.raises(InputError, match=r"go with supports that move in.*Leave them out\.$"):
+        (name,) = what
+        with pytest.raises(InputError, match=rf"goes with supports that move in.*{name}.*Leave it out\.$"):
             erect(arches, design, **what)
-    with pytest.raises(InputError, match="or erect by supports"):
-        erect(shell, shell.design(), by="scaffold", way=[np.zeros((3, 3))])
+    way = [np.zeros((3, 3))]
+    with pytest.raises(InputError, match="Leave it out, or erect by supports"):
+        erect(shell, shell.design(), by="scaffold", way=way)
     for what in ({"props": [0]}, {"tighten_first": True}):
-        with pytest.raises(InputError, match="go with a scaffold"):
+        (name,) = what
+        with pytest.raises(InputError, match=rf"goes with a scaffold.*{name}.*, or erect by a scaffold"):
             erect(shell, shell.design(), by="supports", **what)
+        # What goes with either can't be had by another way up.
+        with pytest.raises(InputError, match=r"goes with supports that move in.*way.*Leave it out\.$"):
+            erect(shell, shell.design(), way=way, **what)
+        with pytest.raises(InputError, match=rf"goes with a scaffold.*{name}.*Leave it out\.$"):
+            erect(shell, shell.design(), by="supports", way=way, **what)
     beam = int(arches.net.edges[0].nodes[1])
     with pytest.raises(InputError, match=f"props.*is no node of a rod.*{beam}"):
         erect(arches, design, props=[beam])
@@ -238,9 +246,34 @@ def test_ways_up_that_end_on_the_way_say_where_and_what_helps(arches, monkeypatc
         erect(arches, design, weight=3.0 * load, step=0.5, tighten_first=True)
     with pytest.raises(NotConverged, match=r"onto the scaffold.*stage 'pinning'.*Prop other crossings"):
         erect(arches, design, weight=1000.0 * load, step=0.5)
+    with pytest.raises(NotConverged, match=r"by itself\. Give a smaller weight\.$"):  # it has no cables
+        erect(arches, arches.unbraced(), weight=3.0 * load, step=0.5)
     monkeypatch.setattr(scaffold, "find_equilibrium", lost)
     with pytest.raises(NotConverged, match=r"lie still on its scaffold.*smaller weight.*prop more crossings"):
         erect(arches, design, step=0.5)
+
+
+@pytest.mark.parametrize(
+    ("tighten_first", "remedy"),
+    [(False, r"Tighten the cables first \(--tighten-first\)"), (True, "Choose stiffer rods")],
+)
+def test_of_a_shell_that_falls_of_nothing_but_its_own_cables_no_smaller_weight_is_asked(
+    arches, monkeypatch, tighten_first, remedy
+):
+    def snapping(self, site, stage, state, drive, *rest, **how):
+        if stage == "lowering":
+            raise NotConverged("snaps", state=state)
+        return passed(self, site, stage, state, drive, *rest, **how)
+
+    def unstable(assembly, start, load):
+        found = find_equilibrium(assembly, start, load)
+        return replace(found, stable=not assembly.cables)  # all but the grid before it has any
+
+    passed = Scaffold._passed
+    monkeypatch.setattr(Scaffold, "_passed", snapping)
+    monkeypatch.setattr(scaffold, "find_equilibrium", unstable)
+    with pytest.raises(NotConverged, match=rf"it doesn't stand by itself\. {remedy}\.$"):
+        erect(arches, arches.design(), tighten_first=tighten_first, step=0.5)
 
 
 def lost(_assembly, start, _load):
