@@ -258,12 +258,6 @@ def erect(
     )
     worst, last = done.worst, done.steps[-1]
     borne = done.props
-    other = (
-        "erect --by scaffold, give the supports other --way points"
-        if borne is None
-        else "prop other crossings (--props)"
-    )
-    breaks = f"rods break on the way: {other}, or choose thinner or stronger rods"
     return SiteResult(
         [
             *counted,
@@ -274,10 +268,25 @@ def erect(
             f"largest cable tension {number(max(each.tension for each in done.steps))} N, largest force on a "
             f"support {number(max(each.reaction for each in done.steps))} N",
             *([] if borne is None else [_scaffold(borne)]),
-            *([breaks] if worst.stress > done.strength else []),
+            *([_broken(worst.stage, borne, tighten_first)] if worst.stress > done.strength else []),
         ],
         files,
     )
+
+
+def _broken(stage: str, borne: Props | None, tighten_first: bool) -> str:
+    """That rods break, most of all in a `stage`, and what helps: another way up only on the way up."""
+    when, helps = "on the way", "prop other crossings (--props)"
+    if stage == "loading":
+        when, helps = "under the load", "give a smaller --load"
+    elif stage.startswith("tightening"):
+        when, helps = (
+            "as cables are tightened",
+            "leave --tighten-first out" if tighten_first else "brace otherwise",
+        )
+    elif borne is None:
+        helps = "erect --by scaffold, give the supports other --way points"
+    return f"rods break {when}: {helps}, or choose thinner or stronger rods"
 
 
 def _scaffold(borne: Props) -> str:

@@ -160,6 +160,14 @@ def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, 
         "lift off, with up to 1\u202f086 N; ropes draw rods' ends in with up to 240 N",
         "rods break on the way: prop other crossings (--props), or choose thinner or stronger rods",
     ]
+    for stage, first, told in [
+        ("loading", True, "under the load: give a smaller --load"),
+        ("tightening group 2", True, "as cables are tightened: leave --tighten-first out"),
+        ("tightening", False, "as cables are tightened: brace otherwise"),
+    ]:
+        steps[1].stage = stage
+        again = onsite.erect(tmp_path, load="wet", lift="none", tighten_first=first, step=0.125)
+        assert again.lines[-1] == f"rods break {told}, or choose thinner or stronger rods"
     borne = Props(push=9.0, pull=0.0, pulled=0, rope=1.5)
     assert onsite.erect(tmp_path, load="wet", lift="none", step=0.125).lines[3] == (
         "the scaffold pushes crossings up with up to 9 N each and holds none of them down; ropes draw rods' ends in with up to 1.5 N"
