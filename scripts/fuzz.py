@@ -119,6 +119,7 @@ _TABLES = {
     "loads.csv": "node,fx,fy,fz\n3,0,0,-0.5\n7,0.1,0,-0.5\n11,0,0,-1e-1\n",
     "groups.csv": "cable,group\n0,1\n1,1\n2,2\n",
     "markers.csv": "crossing\n0\n3\n5\n8\n",
+    "props.csv": "crossing\n1\n2\n4\n7\n",
     "way.csv": "stop,node,x,y,z\n1,0,0.1,0.2,0.0\n2,0,0.1,0.2,0.0\n",
     "survey.csv": "crossing,x,y,z\n0,0.1,0.2,0.1\n3,0.2,0.2,0.1\n5,0.3,0.2,0.1\n8,0.3,0.3,0.1\n",
 }
@@ -134,7 +135,9 @@ _LINES = [
         "--unit", "--noise", "--length-error", "--step", "--largest", "--cables", "--load", "--design", "--after",
     )),
     *(["survey", "RUN", "--replay", "1", option, "?"] for option in ("--seed", "--slip", "--markers", "--noise")),
-    *(["erect", "RUN", option, "?"] for option in ("--step", "--load", "--weight", "--lift", "--design", "--way")),
+    *(["erect", "RUN", option, "?"] for option in (
+        "--step", "--load", "--weight", "--lift", "--design", "--way", "--by", "--props",
+    )),
     *(["calibrate", "RUN", "survey.csv=none", option, "?"] for option in (
         "--unit", "--noise", "--free", "--design", "--markers", "--output",
     )),
@@ -454,6 +457,7 @@ def _read(kind: str, bad: Path, place: Path) -> None:
             "loads.csv": ["erect", place / "run", "--step", "1", "--load", bad],
             "groups.csv": ["erect", place / "run", "--step", "1", "--groups", bad],
             "way.csv": ["erect", place / "run", "--step", "1", "--way", bad],
+            "props.csv": ["erect", place / "run", "--step", "1", "--props", bad],
             "markers.csv": ["survey", place / "run", "--replay", "1", "--markers", bad],
             "survey.csv": ["survey", place / "run", bad],
         }[bad.name]
