@@ -27,7 +27,7 @@ from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError, NotConverged, require_known, require_number
 from shellform.gridshell.gridshell import Design, Gridshell, Rod
 from shellform.gridshell.layers import TwoLayers, locks
-from shellform.site.erection_steps import Erection, ErectionStep, Site, laid_out
+from shellform.site.erection_steps import SMALLEST, Erection, ErectionStep, Site, laid_out
 from shellform.site.scaffold import Scaffold
 from shellform.structure.elements.beam import joined
 from shellform.structure.elements.state import State
@@ -39,7 +39,6 @@ from shellform.structure.solve.loading import advance
 
 SUPPORTS, SCAFFOLD = WAYS_UP = ("supports", "scaffold")
 STEP = 0.1  # of a stage
-_SMALLEST = 1.0 / 256.0  # of a stage: shorter steps lead on where nothing stands
 _SLACK = 1.5  # times its length in the target: a cable that isn't tightened yet
 _LEAST = 1e-4  # of a stage, which then has ten thousand steps
 _TRIAL = 25  # factorisations of one step of tightening
@@ -212,7 +211,7 @@ def _taken_down(
 
         if not steps or steps[-1].stage != stage:
             steps.append(site.step(stage, first, state, drive.at(0.0)))
-        reached = advance(site.assembly, state, drive, step=step, smallest=_SMALLEST, stay=True, report=note)
+        reached = advance(site.assembly, state, drive, step=step, smallest=SMALLEST, stay=True, report=note)
         if not reached.on_branch:
             raise NotConverged(
                 "No stable path leads from the flat grid to the erected one: taken down, it snaps at "
@@ -267,7 +266,7 @@ def _tightened(
             reached = False
         if not reached:
             width *= 0.5
-            if width < _SMALLEST:
+            if width < SMALLEST:
                 first = " or before a scaffold goes (--by scaffold --tighten-first)"
                 held = site.holding is not None and site.holding.props is not None
                 raise NotConverged(

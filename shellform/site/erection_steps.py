@@ -16,6 +16,7 @@ from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
 from shellform.tables import Table, Value, table_text
 
+SMALLEST = 1.0 / 256.0  # of a stage: where no longer step leads on, nothing stands
 _COLUMNS = (
     "stage",
     "share",

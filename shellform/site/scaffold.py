@@ -32,7 +32,7 @@ from shellform.arrays import Flags, Indices, Reals, indices
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.edge_beams import CLAMP, EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.site.erection_steps import ErectionStep, Holding, Site, laid_out
+from shellform.site.erection_steps import SMALLEST, ErectionStep, Holding, Site, laid_out
 from shellform.structure.elements import rotation
 from shellform.structure.elements.ropes import Ropes
 from shellform.structure.elements.state import State
@@ -45,7 +45,6 @@ from shellform.structure.solve.loading import advance
 # of 12 EI/l³, with which a rod's segment resists its end's moving aside: ropes that draw ends, that lead them
 _FIRM, _SOFT = 1.0, 0.03
 _PIECES = 10  # of raising, at least: on each the ropes' anchors move straight
-_SMALLEST = 1.0 / 256.0
 _SLIGHT = 1e-6  # of the force that bends a segment by its own length
 _ALIKE = 1e-6  # of the shell's extent, by which two paths to one state differ
 _ONTO = (
@@ -299,7 +298,7 @@ class Scaffold:
         if not steps or steps[-1].stage != stage:
             steps.append(site.step(stage, first, state, self.weight))
         width = self.step if widest is None else widest
-        reached = advance(site.assembly, state, drive, step=width, smallest=_SMALLEST, stay=True, report=note)
+        reached = advance(site.assembly, state, drive, step=width, smallest=SMALLEST, stay=True, report=note)
         if not reached.on_branch:
             raise NotConverged(
                 f"{lost[0]}, at {first + reached.share * (last - first):.2f} of the stage {stage!r}",
