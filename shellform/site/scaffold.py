@@ -47,10 +47,7 @@ _FIRM, _SOFT = 1.0, 0.03
 _PIECES = 10  # of raising, at least: on each the ropes' anchors move straight
 _SLIGHT = 1e-6  # of the force that bends a segment by its own length
 _ALIKE = 1e-6  # of the shell's extent, by which two paths to one state differ
-_ONTO = (
-    "No stable path leads from the flat grid onto the scaffold and to its ends' places",
-    "Prop other crossings, or give a smaller weight.",
-)
+_ONTO = "No stable path leads from the flat grid onto the scaffold and to its ends' places"
 _STEEPEST = 0.5  # cosine of the slope of the surface over a prop
 
 
@@ -150,9 +147,13 @@ class Scaffold:
 
     def _standing_better(self, braced_later: bool) -> str:
         """What to do where the shell doesn't stand by itself."""
-        ways = ["tighten the cables first (--tighten-first)"] if braced_later else []
-        ways += ["give a smaller weight"] if self.weight.any() else []
-        return f"{', or '.join(ways) or 'choose stiffer rods'}.".capitalize()
+        ways = ["Tighten the cables first (--tighten-first)"] if braced_later else []
+        return self._or_lighter(*ways) or "Choose stiffer rods."
+
+    def _or_lighter(self, *ways: str) -> str:
+        """These ways to go on, and a smaller weight where there is one."""
+        every = [*ways, *(["give a smaller weight"] if self.weight.any() else [])]
+        return f"{', or '.join(every)}.".capitalize() if every else ""
 
     def _let_down(
         self, stage: str, state: State, held: Site, freed: Site, lost: tuple[str, str]
@@ -234,9 +235,9 @@ class Scaffold:
             return find_equilibrium(there, self.shell.target, self.weight).state
         except NotConverged as error:
             raise NotConverged(
-                "The grid doesn't lie still on its scaffold under the weight",
+                "The grid doesn't lie still on its scaffold",
                 state=error.state,
-                remedy="Give a smaller weight, N, downwards negative, or prop more crossings.",
+                remedy=self._or_lighter("Prop more crossings"),
             ) from error
 
     def _flattened(self, soft: Site, state: State, steps: list[ErectionStep]) -> None:
@@ -284,11 +285,11 @@ class Scaffold:
         drive: Drive,
         shares: tuple[float, float],
         steps: list[ErectionStep],
-        lost: tuple[str, str] = _ONTO,
+        lost: tuple[str, str] | None = None,
         widest: float | None = None,
     ) -> State:
         """The state at the end of the drive, from one share of the stage to another; its steps are added.
-        Raises NotConverged where its branch ends, with what is `lost` and what to do.
+        Raises NotConverged where its branch ends, with what is `lost` and what to do (None: the way up).
         """
         first, last = shares
 
@@ -300,9 +301,10 @@ class Scaffold:
         width = self.step if widest is None else widest
         reached = advance(site.assembly, state, drive, step=width, smallest=SMALLEST, stay=True, report=note)
         if not reached.on_branch:
+            what, remedy = lost or (_ONTO, self._or_lighter("Prop other crossings"))
             raise NotConverged(
-                f"{lost[0]}, at {first + reached.share * (last - first):.2f} of the stage {stage!r}",
+                f"{what}, at {first + reached.share * (last - first):.2f} of the stage {stage!r}",
                 state=reached.equilibrium.state,
-                remedy=lost[1],
+                remedy=remedy,
             )
         return reached.equilibrium.state
