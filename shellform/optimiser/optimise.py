@@ -39,7 +39,7 @@ A limit that the start breaks stops neither: no batch may break it more.
 The search ends where the model predicts too little improvement in its largest window, where the smallest
 window has no better design, or where the evaluations are used up, and thinning after some single cables in a
 row that can't go; the status says which it was. At the end the cables without tension are taken away and the
-design is loaded along the documented path (loading.py); if it should not bear all loads there, the last
+design is loaded along the documented path (settled.py); if it should not bear all loads there, the last
 accepted design that does is returned.
 """
 

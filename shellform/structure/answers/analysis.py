@@ -2,11 +2,12 @@
 (documentation/reference/model.md).
 
 Four ways lead to the equilibrium under a load. Relaxation, the default, goes in adaptive increments on the
-stable branch and, past its end, follows the snap-through to a stable state (loading.py). Newton takes whole
-increments without help, dynamic relaxation lets the network move until it comes to rest (dynamic.py). A path
-goes through limit points, loads falling and rising, to where the factor first comes to its goal or a led
-displacement to its own (path.py). Where relaxation doesn't come to rest under moments that have no potential,
-the path is followed, and a warning says so.
+stable branch (loading.py), where these get no further along the path (settled.py), and past the branch's end
+follows the snap-through to a stable state. Newton takes whole increments without help, dynamic relaxation
+lets the network move until it comes to rest (dynamic.py). A path goes through limit points, loads falling and
+rising, to where the factor first comes to its goal or a led displacement to its own (path.py). Where
+relaxation doesn't come to rest under moments that have no potential, the path is followed, and a warning says
+so.
 """
 
 from __future__ import annotations
