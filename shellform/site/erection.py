@@ -130,7 +130,7 @@ def _loaded(site: Site, state: State, weight: Reals, load: Reals, step: float) -
         steps.append(site.step("loading", share, found.state, weight + share * load))
 
     drive = Drive(load, np.zeros_like(load), weight)
-    reached = advance(site.assembly, state, drive, step=step, stay=True, report=note)
+    reached = advance(site.assembly, state, drive, step=step, stay=True, heeding=True, report=note)
     if not reached.on_branch:
         raise NotConverged(
             f"The shell bears {reached.share:.2f} of the load only",
@@ -211,6 +211,7 @@ def _taken_down(
 
         if not steps or steps[-1].stage != stage:
             steps.append(site.step(stage, first, state, drive.at(0.0)))
+        # It isn't heeded what steps may pass over: at the flat grid all stable paths meet.
         reached = advance(site.assembly, state, drive, step=step, smallest=SMALLEST, stay=True, report=note)
         if not reached.on_branch:
             raise NotConverged(

@@ -181,7 +181,7 @@ class Scaffold:
         found = find_equilibrium(freed, self.shell.target, none)
         if not found.stable:
             raise NotConverged(f"{lost[0]}: it doesn't stand by itself", state=found.state, remedy=lost[1])
-        loaded = advance(freed, found.state, Drive(self.weight, none, none), stay=True)
+        loaded = advance(freed, found.state, Drive(self.weight, none, none), stay=True, heeding=True)
         if not loaded.on_branch:
             raise NotConverged(
                 f"{lost[0]}: it bears {loaded.share:.2f} of the weight by itself",
@@ -299,7 +299,9 @@ class Scaffold:
         if not steps or steps[-1].stage != stage:
             steps.append(site.step(stage, first, state, self.weight))
         width = self.step if widest is None else widest
-        reached = advance(site.assembly, state, drive, step=width, smallest=SMALLEST, stay=True, report=note)
+        reached = advance(
+            site.assembly, state, drive, step=width, smallest=SMALLEST, stay=True, heeding=True, report=note
+        )
         if not reached.on_branch:
             what, remedy = lost or (_ONTO, self._or_lighter("Prop other crossings"))
             raise NotConverged(

@@ -322,8 +322,8 @@ def erected(monkeypatch, *, groups=None, load=None, borne=True, section=None, **
         seen.stages.append((stage, team.tolist(), load[2, 2], widest))
         return design, state + 1, []
 
-    def advance(assembly, state, drive, *, step, stay, report):
-        assert (assembly, state, stay) == ("braced", len(seen.stages), True)
+    def advance(assembly, state, drive, *, step, stay, heeding, report):
+        assert (assembly, state, stay, heeding) == ("braced", len(seen.stages), True, True)
         report(0.4, SimpleNamespace(state="loaded"))
         assert (drive.at(0.0)[2, 2], drive.at(0.4)[2, 2]) == (-2.0, -5.2)
         return SimpleNamespace(on_branch=borne, share=0.4, equilibrium=SimpleNamespace(state="loaded"))
