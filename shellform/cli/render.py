@@ -45,6 +45,9 @@ def render(
         str | None,
         typer.Option(help="Of the erection: supports or scaffold, as shellform erect takes it."),
     ] = None,
+    tighten_first: Annotated[
+        bool, typer.Option("--tighten-first", help="Of the erection: cables before the scaffold is lowered.")
+    ] = False,
     width_mm: Annotated[
         float | None, typer.Option("--width-mm", help="Width in print, mm; letters and lines follow it.")
     ] = None,
@@ -66,7 +69,7 @@ def render(
         design=found.best if design == "best" else design,
         load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods,
         transparent=transparent,
-        kind=kind, film=film, by=by,
+        kind=kind, film=film, by=by, tighten_first=tighten_first,
         force_limit=force_limit, width_mm=width_mm, dpi=dpi, font_size=font_size,
     )  # fmt: skip
     if film is None:

@@ -29,6 +29,7 @@ _LOADS = {"none": "no load", "design": "design load", "additional": "additional 
 QUANTITIES = ("deviation", "utilisation", "curvature", "shear", "spring", "mode", "history")
 FILMS = ("pour", "erection")
 _STILL = ("spring", "mode", "history")  # of one state, or of none
+_FILMED = "Give --film erection, or leave it out."
 _USUAL = (1600, 1000)  # pixels
 
 
@@ -54,7 +55,7 @@ class Wish:
     - `quantity`, one of QUANTITIES; `limit` of its colours, SI units; None: the case's for the deviation, 1
       for the utilisation, what the rods bear for their curvature, else the largest.
     - `force_limit`, N, of the cables' colours; 0: the largest.
-    - `paper` that it is for; None: a screen. `by`: as `erect` takes it, of a film.
+    - `paper` that it is for; None: a screen. `by`, `tighten_first`: as `erect` takes them, of a film.
     - `endings` of the files; the rest as in panel.py.
     """
 
@@ -70,6 +71,7 @@ class Wish:
     force_limit: float = 0.0
     paper: Paper | None = None
     by: str | None = None
+    tighten_first: bool = False
 
 
 def wish(
@@ -89,6 +91,7 @@ def wish(
     dpi: float | None = None,
     font_size: float | None = None,
     by: str | None = None,
+    tighten_first: bool = False,
 ) -> Wish:
     """A wish as the command line says it: `size` as WIDTHxHEIGHT, the file's `kind` without a dot. Raises
     InputError for bad options.
@@ -106,13 +109,9 @@ def wish(
             value="--transparent" if transparent else quantity,
             remedy="Leave --transparent out." if transparent else f"Films show {filmed}.",
         )
-    if by is not None and film != "erection":
-        raise InputError(
-            "says how a grid is erected",
-            where="--by",
-            value=by,
-            remedy="Give --film erection, or leave it out.",
-        )
+    if (by is not None or tighten_first) and film != "erection":
+        given = "--tighten-first" if by is None else "--by"
+        raise InputError("says how a grid is erected", where=given, value=by, remedy=_FILMED)
     if quantity is not None:
         require_known(quantity, QUANTITIES, where="--quantity", what="is nothing to draw")
     kinds = ("gif", "mp4") if film else ("png", "svg", "pdf")
@@ -120,7 +119,6 @@ def wish(
         require_known(kind, kinds, where="--format", what="is no format of it")
     chosen_kinds = (kind,) if kind else kinds if film else kinds[:1]
     usual = "utilisation" if film == "erection" else "deviation"
-    endings = tuple(f".{each}" for each in chosen_kinds)
     return Wish(
         design=design,
         load=load,
@@ -130,10 +128,11 @@ def wish(
         size=None if size is None else _pixels(size),
         thickness=thickness,
         transparent=transparent,
-        endings=endings,
+        endings=tuple(f".{each}" for each in chosen_kinds),
         force_limit=force_limit or 0.0,
         paper=paper,
         by=by,
+        tighten_first=tighten_first,
     )
 
 

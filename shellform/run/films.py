@@ -127,23 +127,25 @@ def _erection(run: Run, name: str, wish: Wish, report: Report) -> list[Any]:
     report(Event("film", "following the grid from the ground"))
     design, shell = run.designs[name], run.shell_of(name)
     load = run.loads[wish.load] if wish.load else None
-    steps = _shown(erect(shell, design, by=wish.by, load=load, step=1.0 / _FRAMES).steps)
-    rising = [step for step in steps if step.stage not in ("tightening", "loading")]
-    pairs = rising[-1].state.positions[shell.cable_ends]
+    found = erect(shell, design, by=wish.by, tighten_first=wish.tighten_first, load=load, step=1.0 / _FRAMES)
+    steps = _shown(found.steps)
+    braced = (k for k, step in enumerate(steps) if step.stage in ("tightening", "loading"))
+    first = next(braced, len(steps))  # step with cables
+    pairs = steps[first - 1].state.positions[shell.cable_ends]
     slack = np.maximum(
         np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1), design.rest_length
     )  # as erection.py begins to tighten them
     none = replace(design, present=np.zeros(len(design.present), dtype=bool))
     panels: list[Any] = []
-    for step in steps:
-        tightened = 1.0 if step.stage == "loading" else step.share
+    for number, step in enumerate(steps):
+        tightened = step.share if step.stage == "tightening" else 1.0
         shown = replace(design, rest_length=slack + tightened * (design.rest_length - slack))
         acting = step.share * load if load is not None and step.stage == "loading" else None
         title = f"{name} design, {step.stage}, {100.0 * step.share:.0f} %"
         panels.append(
             maps.panel_of(
                 shell,
-                none if len(panels) < len(rising) else shown,
+                none if number < first else shown,
                 step.state,
                 load=acting,
                 quantity=wish.quantity,

@@ -132,14 +132,40 @@ def test_a_film_of_an_erection_by_a_scaffold_shows_few_of_the_steps_in_which_lit
     assert [each.share for each in shown[25:30]] == [0.0, 0.25, 0.5, 0.75, 1.0]
     asked = []
 
-    def erect(shell, design, *, by, load, step):
-        asked.append(by)
+    def erect(shell, design, *, by, tighten_first, load, step):
+        asked.append((by, tighten_first))
         raise NotConverged("enough")
 
     monkeypatch.setattr(films, "erect", erect)
     with pytest.raises(NotConverged, match="enough"):
         draw_film(run, "erection", Wish("initial", by="scaffold", endings=(".gif",)))
-    assert asked == ["scaffold"]
+    with pytest.raises(NotConverged, match="enough"):
+        draw_film(run, "erection", Wish("initial", by="scaffold", tighten_first=True, endings=(".gif",)))
+    assert asked == [("scaffold", False), ("scaffold", True)]
+
+
+def test_in_a_film_cables_tightened_on_the_scaffold_stay_when_it_goes(run, monkeypatch):
+    """Their rest lengths come down while they are tightened, and neither before nor after."""
+    state, design = run.states["initial"]["none"], run.designs["initial"]
+    stages = [
+        ("raising", 1.0),
+        ("tightening", 0.5),
+        ("tightening", 1.0),
+        ("lowering", 0.5),
+        ("lowering", 1.0),
+    ]
+    steps = [SimpleNamespace(stage=stage, share=share, state=state) for stage, share in stages]
+    shown = []
+    monkeypatch.setattr(films, "erect", lambda *_, **__: SimpleNamespace(steps=steps))
+    monkeypatch.setattr(films, "_shown", list)
+    monkeypatch.setattr(
+        "shellform.output.pictures.maps.panel_of", lambda _, each, *__, **___: shown.append(each)
+    )
+    films._erection(run, "initial", Wish("initial", by="scaffold", tighten_first=True), lambda event: None)
+    assert [each.present.any() for each in shown] == [False, True, True, True, True]
+    over = [float((each.rest_length - design.rest_length).sum()) for each in shown[1:]]
+    assert over[0] > 0.0
+    assert over[1:] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
 
 
 def test_a_shell_poured_in_stages_is_filmed_through_all_of_them(run, monkeypatch):
