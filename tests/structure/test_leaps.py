@@ -1,5 +1,6 @@
 """What increments may leap over, on stand-ins and a bar whose numbers are worked out by hand."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +13,7 @@ from shellform.structure.solve import leaps, loading
 from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import Equilibrium
 from shellform.structure.solve.loading import advance
+from shellform.structure.solve.outlook import Outlook, View
 from shellform.verification.models import CLAMP, chain, line, load_at
 
 STILL = SimpleNamespace(at=lambda factor: factor, moves_supports=False)
@@ -27,7 +29,7 @@ def heeded(monkeypatch):
     def find(assembly, start, load, *, tolerance, limit=None, on_branch=False):
         return Equilibrium(f"at {load:g}", 0.5, 1e-9, asked.cost, True, 0)
 
-    def may_leap(assembly, before, after, drive, factor, change):
+    def may_leap(watch, before, after, factor, change):
         asked.looked.append((before, after, factor, change))
         return asked.leaps
 
@@ -37,7 +39,7 @@ def heeded(monkeypatch):
 
     monkeypatch.setattr(loading, "find_equilibrium", find)
     monkeypatch.setattr(leaps, "_far", lambda before, after: asked.far)
-    monkeypatch.setattr(leaps, "_may_leap", may_leap)
+    monkeypatch.setattr(leaps.Watch, "_may_leap", may_leap)
     monkeypatch.setattr(leaps, "_returns", returns)
     monkeypatch.setattr(leaps.Watch, "passes_over", lambda *_: False)
     return asked
@@ -100,13 +102,25 @@ def rests(monkeypatch):
         return None if slope < 0.0 else (None, None, np.array([[0.0, 0.0, 0.0], [1.0 / slope, 0.0, 0.0]]))
 
     monkeypatch.setattr(leaps, "at_rest", at_rest_under)
+
+    def seen(state, values, factor, onward, before):
+        return View(state, values, onward, None, None)
+
+    own = Outlook(None, 1.0, np.ones(1))
+    monkeypatch.setattr(own, "view", seen)
     monkeypatch.setattr(leaps, "_motion", motion)
+    monkeypatch.setattr(leaps, "fit_for", lambda assembly, state: assembly)
+    monkeypatch.setattr(leaps, "_outlook", lambda assembly, state: own)
     return found
+
+
+def watch():
+    return leaps.Watch(None, STILL, 1.0, 44)
 
 
 def may_leap(rests, low, high):
     before, after = rests.load(low), rests.load(high)
-    return leaps._may_leap(None, along(low), along(high), STILL, after, after - before)
+    return watch()._may_leap(along(low), along(high), after, after - before)
 
 
 def test_an_increment_over_a_peak_and_a_valley_may_leap_and_one_before_or_beyond_them_does_not(rests):
@@ -126,9 +140,9 @@ def test_a_state_that_is_not_at_rest_before_tells_nothing_nor_does_one_of_other_
     rests.load = lambda x: x * (1.0 - x) * (1.0 - 0.5 * x)
     rests.slope = lambda x: 1.0 - 3.0 * x + 1.5 * x * x
     low, high, last = along(0.0), along(2.1), rests.load(2.1)
-    assert leaps._may_leap(None, low, high, STILL, last, last)
-    assert not leaps._may_leap(None, low, high, STILL, last, 0.9 * last)
-    assert not leaps._may_leap(None, low, SimpleNamespace(tail=1.0), STILL, last, last)
+    assert watch()._may_leap(low, high, last, last)
+    assert not watch()._may_leap(low, high, last, 0.9 * last)
+    assert not watch()._may_leap(low, replace(high, tail=np.zeros((2, 7))), last, last)
 
 
 @pytest.mark.parametrize(("off", "comes_back"), [(0.0, True), (0.039, True), (0.041, False), (0.4, False)])
@@ -240,7 +254,7 @@ class Foreseen:
 
     def view(self, state, values, factor, onward, before):
         assert (values, factor, onward) == ("values", "factor", "motion")
-        return SimpleNamespace(at=state.at, before=None if before is None else before.at)
+        return SimpleNamespace(state=state, at=state.at, before=None if before is None else before.at)
 
     def passes_over(self, before, after, width, share):
         assert after.at - before.at == pytest.approx(width)

@@ -12,7 +12,7 @@ from shellform.structure.solve.drive import Drive, carried
 from shellform.structure.solve.equilibrium import Equilibrium, find_equilibrium
 from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
-from shellform.structure.solve.outlook import WINDOW, Outlook, View, turns_between
+from shellform.structure.solve.outlook import WINDOW, Outlook, View
 from shellform.structure.solve.residual import ResidualNorm, held
 
 _RETURNED = 0.1  # of the way of an increment, as near as it comes to its begin from its end unless it leapt
@@ -28,38 +28,51 @@ class Watch:
     def __init__(self, assembly: Assembly, drive: Drive, most: float, limit: int) -> None:
         self.assembly, self.drive, self.most, self.limit = assembly, drive, most, limit
         self.spent = 0
-        self._view: View | None = None  # from where the next increment begins
+        self._views: tuple[View, ...] = ()  # from the ends of the increment looked at last
 
     def leaps(
         self, before: State, found: Equilibrium, factor: float, change: float, *, shortest: bool
     ) -> bool:
         """Whether an increment by a `change` of the load factor up to this one has leapt; `shortest`: it
         can't be halved any more, so that it is taken back."""
-        given = self.assembly, before, found.state, self.drive, factor, change
+        given = before, found.state, factor, change
         if found.factorisations <= _STRAIGHT and not _far(before, found.state):
             return False
-        return _may_leap(*given) and not (shortest and _returns(*given, self.limit))
+        return self._may_leap(*given) and not (
+            shortest and _returns(self.assembly, before, found.state, self.drive, factor, change, self.limit)
+        )
+
+    def _may_leap(self, before: State, after: State, factor: float, change: float) -> bool:
+        """Whether an increment from one state to the other may have leapt over an unstable stretch. Where not
+        both its ends are to be seen, that tells nothing."""
+        ends = self._ends(before, after, factor, change)
+        return ends is not None and _outlook(fit_for(self.assembly, after), after).turns(*ends, change)
 
     def passes_over(self, before: State, after: State, factor: float, change: float) -> bool:
         """Whether the increment may have passed over what its ends foretell."""
-        if abs(change) <= WINDOW * self.most or not len(self.assembly.free):
-            self._view = None
-            return False
         share = abs(change) / self.most
-        begin = self._view or self._seen(before, factor - change, None)
-        then = self._seen(after, factor, begin if _alike(before, after) else None)
-        if begin is not None and then is not None and _alike(before, after):
-            outlook = _outlook(fit_for(self.assembly, after), after)
-            if outlook.passes_over(begin, then, change, share):
-                self._view = begin
-                return True
-        self._view = then
-        return False
+        if share <= WINDOW or not len(self.assembly.free):
+            return False
+        ends = self._ends(before, after, factor, change)
+        return ends is not None and _outlook(fit_for(self.assembly, after), after).passes_over(
+            *ends, change, share
+        )
+
+    def _ends(self, before: State, after: State, factor: float, change: float) -> tuple[View, View] | None:
+        """What is to be seen from both ends of an increment; None where one of them isn't in equilibrium, or
+        has more digits than the other, so that the motion at that one lacks some."""
+        alike = (before.tail is None) == (after.tail is None)
+        begin = self._seen(before, factor - change, None)
+        then = self._seen(after, factor, begin if alike else None)
+        self._views = tuple(each for each in (begin, then) if each is not None)
+        return (begin, then) if alike and begin is not None and then is not None else None
 
     def _seen(self, state: State, factor: float, before: View | None) -> View | None:
-        """What is to be seen from a state by the load factor; None where it isn't in equilibrium."""
-        if not at_rest(self.assembly, state, self.drive.at(factor)):
-            return None
+        """What is to be seen from a state by the load factor, after the view `before`; None where it isn't in
+        equilibrium."""
+        known = next((each for each in self._views if each.state is state), None)
+        if known is not None or not at_rest(self.assembly, state, self.drive.at(factor)):
+            return known
         self.spent += 1
         found = _motion(self.assembly, state, self.drive)
         if found is None:
@@ -87,11 +100,6 @@ def _far(before: State, after: State) -> bool:
     return bool(way > _NEAR * np.ptp(before.positions, axis=0).max())
 
 
-def _alike(before: State, after: State) -> bool:
-    """Whether both states have the same number of digits; else the motion at one of them lacks some."""
-    return (before.tail is None) == (after.tail is None)
-
-
 def at_rest(assembly: Assembly, state: State, load: Reals) -> bool:
     """Whether the state is in equilibrium, which that of a prestressed model without a start isn't."""
     return ResidualNorm(assembly).residual(assembly.evaluate(state, tangent=False), load) < _BALANCED
@@ -110,25 +118,6 @@ def _motion(assembly: Assembly, state: State, drive: Drive) -> tuple[Reals, Fact
         return None
     motion[assembly.free] = factor.solve(grows.ravel()[assembly.free])
     return balance.tangent, factor, motion.reshape(-1, 6)
-
-
-def _may_leap(
-    assembly: Assembly, before: State, after: State, drive: Drive, factor: float, change: float
-) -> bool:
-    """Whether an increment from one state to the other, by a `change` of the load factor up to this one, may
-    have leapt over an unstable stretch: whether the cubic through both, with the rates at which the nodes
-    move there, turns back. A state that isn't in equilibrium before, or has other digits, tells nothing."""
-    if not _alike(before, after) or not at_rest(assembly, before, drive.at(factor - change)):
-        return False
-    way = after.positions - before.positions
-    length, rates = float(np.linalg.norm(way)), []
-    for state in (before, after):
-        found = _motion(assembly, state, drive)
-        rate = 0.0 if found is None else float(np.einsum("ij,ij", way, found[2][:, :3]))
-        if length == 0.0 or rate == 0.0:
-            return False
-        rates.append(length / rate)
-    return turns_between(rates[0], rates[1], change / length)
 
 
 def _returns(
