@@ -7,8 +7,9 @@ from __future__ import annotations
 import zipfile
 import zlib
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,12 +22,13 @@ Flags = NDArray[np.bool_]
 
 Shape = Sequence[int | None]
 _T = TypeVar("_T", bound=np.generic)
+_FEW = 6  # numbers of an array that are told themselves: a point, a load
 
 
 class Record:
     """A frozen dataclass that holds arrays. It is made with eq=False, for a comparison of arrays has no one
     truth value: it equals itself only. NumPy unpickles and copies a read-only array as a writable one; here
-    it becomes read-only again.
+    it becomes read-only again. Its text tells arrays by their sizes, not by thousands of numbers.
     """
 
     __eq__ = object.__eq__  # and not that of another base, which compares its own fields only
@@ -35,6 +37,16 @@ class Record:
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():
             object.__setattr__(self, name, _locked(value))
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        cls.__repr__ = cls.__repr__  # type: ignore[method-assign]  # a dataclass keeps what stands in its class
+
+    def __repr__(self) -> str:
+        told = (
+            f"{each.name}={_told(getattr(self, each.name))}" for each in fields(cast(Any, self)) if each.repr
+        )
+        return f"{type(self).__qualname__}({', '.join(told)})"
 
 
 def reals(name: str, value: ArrayLike, shape: Shape, *, positive: bool = False) -> Reals:
@@ -112,6 +124,21 @@ def frozen(raw: NDArray[_T]) -> NDArray[_T]:
     copy = np.array(raw, order="C", copy=True)
     copy.setflags(write=False)
     return copy
+
+
+def _told(value: object) -> str:
+    """`value` in a line; by its size an array, tuple, list or dictionary of more than `_FEW` entries."""
+    if isinstance(value, np.ndarray):
+        few = value.size <= _FEW
+        return str(value.tolist()) if few else f"array({' × '.join(map(str, value.shape))})"
+    if isinstance(value, tuple | list | dict) and len(value) > _FEW:
+        return f"{type(value).__name__} of {len(value)}"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{name!r}: {_told(each)}" for name, each in value.items()) + "}"
+    if type(value) in (tuple, list):
+        told = ", ".join(map(_told, cast(Sequence[object], value)))
+        return f"[{told}]" if isinstance(value, list) else f"({told}{',' * (len(cast(Any, value)) == 1)})"
+    return repr(value)
 
 
 def _locked(value: Any) -> Any:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shellform.arrays import Reals, indices, reals
+from shellform.arrays import Reals, Record, indices, reals
 from shellform.errors import InputError, require_number
 from shellform.structure.elements.sections import Section, stiffness
 from shellform.structure.model import Model, parse_model
@@ -28,7 +28,7 @@ _Lines = list[tuple[int, int, dict[str, float]]]  # two nodes, and what the line
 
 
 @dataclass(frozen=True, eq=False)
-class OwnNetwork:
+class OwnNetwork(Record):
     """A `model`, and the `keys` (n,) that its nodes had where they came from, in order."""
 
     model: Model
@@ -95,7 +95,7 @@ def from_arrays(
             (a, b, {} if rest is None else {"rest_length": float(rest[k])})
             for k, (a, b) in enumerate(ties.tolist())
         ],
-        _supported(supports),
+        {node: _holding(f"supports[{node}]", how) for node, how in _supported(supports).items()},
         {name: dict(enumerate(force.tolist())) for name, force in forces.items()},
         rod,
         cable,
@@ -113,6 +113,13 @@ def from_networkx(graph: Any, *, rod: Rod | None = None, cable: float | None = N
             where="graph",
             value=type(graph).__name__,
             remedy="Give a graph of networkx, or arrays to from_arrays.",
+        )
+    if hasattr(graph, "node_attribute"):
+        raise InputError(
+            "is a graph of COMPAS",
+            where="graph",
+            value=type(graph).__name__,
+            remedy="Give it to from_compas.",
         )
     nodes = [(key, dict(data)) for key, data in graph.nodes(data=True)]
     edges = [(a, b, dict(data)) for a, b, data in graph.edges(data=True)]
@@ -136,10 +143,8 @@ def from_compas(data: Any, *, rod: Rod | None = None, cable: float | None = None
 
     def attributes(key: Hashable) -> dict[str, Any]:
         found = {name: of(key, name) for name in ("x", "y", "z", "load")}
-        held = next(
-            (value for name in ("support", "is_support", "is_anchor") if (value := of(key, name))), None
-        )
-        return {**found, "support": held}
+        held = (of(key, name) for name in ("support", "is_support", "is_anchor"))
+        return {**found, "support": next((each for each in held if not _is_free(each)), None)}
 
     nodes = [(key, attributes(key)) for key in keys]
     edges = [
@@ -162,27 +167,41 @@ def _from_attributes(
         place = data["pos"] if data.get("pos") is not None else [data.get(axis) for axis in "xyz"]
         where = f"node {key!r}"
         places.append(_three(where, place, "Give pos = (x, y, z), or x, y and z."))
-        if data.get("support"):
-            held[k] = "pinned" if isinstance(data["support"], bool | np.bool_) else str(data["support"])
+        if not _is_free(data.get("support")):
+            held[k] = _holding(f"{where}: support", data["support"])
         if data.get("load") is not None:
-            loads[k] = _three(where, data["load"], "A load has three components.")
-    known = ("rod", "cable", None)
+            loads[k] = _three(f"{where}: load", data["load"], "Give three components, N.")
+    rods, cables, seen = _Lines(), _Lines(), set[tuple[bool, Hashable, Hashable]]()
     for a, b, data in edges:
-        if data.get("kind") not in known:
+        where, kind, own = f"edge {a!r}, {b!r}", data.get("kind"), {}
+        if not (kind is None or (isinstance(kind, str) and kind in ("rod", "cable"))):
             raise InputError(
                 "is neither a rod nor a cable",
-                where=f"edge {a!r}, {b!r}: kind",
-                value=data["kind"],
+                where=f"{where}: kind",
+                value=kind,
                 remedy='Set kind to "rod" or "cable".',
             )
-    rods, cables = _Lines(), _Lines()
-    for a, b, data in edges:
-        own = {}
+        if a == b or places[number[a]] == places[number[b]]:
+            raise InputError(
+                "has both its ends at one place",
+                where=where,
+                value=places[number[a]],
+                remedy="Leave the edge out, or move one of its nodes.",
+            )
+        tied = kind == "cable"
+        if (tied, b, a) in seen:  # edges side by side of a multigraph all run one way
+            raise InputError(
+                "is there the other way round, too, which would count it twice",
+                where=where,
+                remedy="Leave one of the two out; of a directed graph give graph.to_undirected().",
+            )
+        seen.add((tied, a, b))
         if data.get("rest_length") is not None:
-            own["rest_length"] = data["rest_length"]
-            where = f"edge {a!r}, {b!r}: rest_length"
-            require_number(own["rest_length"], above=0.0, where=where, give="metres, such as 0.055")
-        (cables if data.get("kind") == "cable" else rods).append((number[a], number[b], own))
+            require_number(
+                data["rest_length"], above=0.0, where=f"{where}: rest_length", give="metres, such as 0.055"
+            )
+            own["rest_length"] = float(data["rest_length"])
+        (cables if tied else rods).append((number[a], number[b], own))
     return _built(keys, places, rods, cables, held, {"load": loads} if loads else {}, rod, cable)
 
 
@@ -207,14 +226,6 @@ def _built(
     if cable is not None:
         require_number(cable, above=0.0, where="cable", give="their axial stiffness EA, N, such as 187.0")
     of_rods = {} if rod is None else _stiffnesses(rod)
-    for node, how in held.items():
-        if not isinstance(how, str) or how not in _FIXED:
-            raise InputError(
-                "is no way to hold a node",
-                where=f"supports[{node}]",
-                value=how,
-                remedy="Known: pinned, fixed.",
-            )
     model = parse_model(
         {
             "format": "shellform-model",
@@ -262,7 +273,24 @@ def _stiffnesses(rod: Any) -> dict[str, float]:
     return dict(zip(("EA", "GJ", "EIy", "EIz"), values.tolist(), strict=True))
 
 
-def _supported(supports: Mapping[int, str] | Sequence[int]) -> dict[int, str]:
+def _is_free(how: object) -> bool:
+    """Whether a node's `support` is none: left out, false, 0 or empty."""
+    return how is None or (np.isscalar(how) and not how)
+
+
+def _holding(where: str, how: Any) -> str:
+    """How a node is held: "pinned" or "fixed", as its `support` says; true, or 1 as of a table, is pinned.
+    Raises InputError for any other."""
+    if np.isscalar(how) and how in _FIXED:
+        return str(how)
+    if np.isscalar(how) and not isinstance(how, str) and how == 1:
+        return "pinned"
+    raise InputError(
+        "is no way to hold a node", where=where, value=how, remedy='Give "pinned" or "fixed"; true is pinned.'
+    )
+
+
+def _supported(supports: Mapping[int, str] | Sequence[int]) -> dict[int, Any]:
     """How each support is held, by the node's number. Raises InputError for what are no numbers: a flag isn't
     one."""
     strange: list[object] = []
@@ -292,4 +320,6 @@ def _three(where: str, given: Any, remedy: str) -> list[float]:
         raise InputError("has no three numbers", where=where, value=given, remedy=remedy) from error
     if len(values) != 3:
         raise InputError("has no three numbers", where=where, value=given, remedy=remedy)
+    if not np.isfinite(values).all():
+        raise InputError("has a number that is not finite", where=where, value=values, remedy=remedy)
     return values

@@ -68,6 +68,19 @@ def same(one, other):
     assert one.model.loads["load"] == pytest.approx(other.model.loads["load"])
 
 
+def placed(**of_first):
+    """The network with other attributes of its first node."""
+    given = points()
+    given["a"] |= of_first
+    return sf.networks.from_networkx(Graph(given, EDGES), rod=ROD, cable=187.0)
+
+
+class DirectedCompas:
+    """COMPAS's graph, which has the names of networkx's calls and another meaning of data."""
+
+    node_attribute = nodes = edges = staticmethod(lambda *given, **named: None)
+
+
 def plain():
     load = np.zeros((3, 3))
     load[1] = LOAD
@@ -103,6 +116,36 @@ def test_what_numpy_made_of_stiffnesses_and_flags_means_the_same():
     held = points()
     held["c"]["support"] = np.True_
     same(*(sf.networks.from_networkx(Graph(each, EDGES), rod=ROD, cable=187.0) for each in (points(), held)))
+
+
+def test_numbers_of_tables_and_numpy_s_own_mean_what_python_s_mean():
+    """1 and 0 as of a CSV file for true and false; a length of single precision."""
+    wanted = sf.networks.from_networkx(
+        Graph(points(), [*EDGES[:2], tied("rest_length", 0.5)]), rod=ROD, cable=187.0
+    )
+    given = points()
+    given["c"]["support"], given["top"]["support"] = np.int64(1), 0
+    edges = [*EDGES[:2], tied("rest_length", np.float32(0.5))]
+    same(sf.networks.from_networkx(Graph(given, edges), rod=ROD, cable=187.0), wanted)
+    same(sf.networks.from_compas(Compas(given, edges, "node"), rod=ROD, cable=187.0), wanted)
+
+
+def test_rods_and_a_cable_side_by_side_are_all_kept():
+    both = [*EDGES[:2], EDGES[0], ("top", "a", {"kind": "cable"})]
+    found = sf.networks.from_networkx(Graph(points(), both), rod=ROD, cable=187.0).model.network
+    assert found.beams.ends.tolist() == [[0, 1], [1, 2], [0, 1]]
+    assert found.cables.ends.tolist() == [[1, 0]]
+
+
+def test_a_network_and_its_analysis_are_shown_in_a_line_not_as_thousands_of_numbers():
+    own = sf.networks.from_arrays(
+        np.arange(300.0).reshape(100, 3), [[k, k + 1] for k in range(99)], rod=ROD, supports={0: "fixed"},
+        loads={"none": np.zeros((100, 3))},
+    )  # fmt: skip
+    for shown in (repr(own), repr(own.model.network), repr(analyse(own.model, load="none"))):
+        assert "nodes=array(100 × 3)" in shown
+        assert len(shown) < 2500
+        assert "\n" not in shown
 
 
 def test_the_model_has_the_places_stiffnesses_lengths_supports_and_forces_that_were_given():
@@ -226,6 +269,30 @@ def test_a_section_gives_the_stiffnesses_and_the_model_is_solved():
             lambda: sf.networks.from_networkx(Graph(points(), [tied("rest_length", "long")]), cable=1.0),
             "edge 'a', 'c': rest_length: must be a number",
         ),
+        (lambda: placed(support=np.ones(6)), "node 'a': support: is no way to hold a node"),
+        (lambda: placed(support="clamped"), "node 'a': support: is no way to hold a node.*true is pinned"),
+        (lambda: placed(support=2), "node 'a': support: is no way to hold a node"),
+        (lambda: placed(z=np.nan), "node 'a': has a number that is not finite"),
+        (lambda: placed(load=(0, 0, np.inf)), "node 'a': load: has a number that is not finite"),
+        (lambda: placed(load=-5.0), "node 'a': load: has no three numbers"),
+        (lambda: placed(x=1.0), "edge 'a', 'c': has both its ends at one place"),
+        (
+            lambda: sf.networks.from_networkx(Graph(points(), [("a", "a", {})]), rod=ROD),
+            "edge 'a', 'a': has both its ends at one place",
+        ),
+        (
+            lambda: sf.networks.from_networkx(Graph(points(), [*EDGES, ("top", "a", {})]), rod=ROD),
+            "edge 'top', 'a': is there the other way round, too.*to_undirected",
+        ),
+        (
+            lambda: sf.networks.from_compas(Compas(points(), [("a", "c", {"kind": ["cable"]})], "node")),
+            "edge 'a', 'c': kind: is neither a rod nor a cable",
+        ),
+        (
+            lambda: sf.networks.from_compas(Compas(points() | {"a": {"is_anchor": np.ones(2)}}, [], "node")),
+            "node 'a': has no three numbers",
+        ),
+        (lambda: sf.networks.from_networkx(DirectedCompas()), "is a graph of COMPAS.*from_compas"),
     ],
 )
 def test_what_is_no_network_is_refused_with_where_it_is_wrong(make, message):
