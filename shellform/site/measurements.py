@@ -47,20 +47,35 @@ def text_of(path: str | Path, remedy: str) -> str:
         raise InputError(unreadable(error), where=str(path), remedy=remedy) from error
 
 
-def cells_of(file: Path, numbered: list[tuple[int, str]], delimiter: str) -> list[list[str]]:
-    """The cells of each of a file's lines, which come with their numbers. Raises InputError where a line is
-    no row of its own: a quotation mark that isn't closed runs on over the lines that follow."""
-    rows: list[list[str]] = []
-    for number, line in numbered:
+def numbered_cells(file: Path, text: str) -> list[tuple[int, list[str]]]:
+    """The lines of a table, each with its number and its cells; remarks and empty lines are passed over.
+    Cells are parted by what the first line has of semicolon, tab and comma, where it has none of them by
+    blanks. Raises InputError where a line is no row of its own: a quotation mark that isn't closed runs on
+    over the lines that follow."""
+    kept = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    delimiter = next((each for each in ";\t," if kept and each in kept[0][1]), " ")
+    rows: list[tuple[int, list[str]]] = []
+    for number, line in kept:
         try:
-            rows += csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True)
+            # blanks at a line's end begin no cell
+            (cells,) = csv.reader([line.strip(" ")], delimiter=delimiter, skipinitialspace=True, strict=True)
         except csv.Error as error:
             raise InputError(
                 f"can't be parted into cells: {error}",
                 where=f"{file}, line {number}",
                 remedy="Close its quotation marks, or leave them out.",
             ) from error
+        rows.append((number, cells))
     return rows
+
+
+def names_in(cells: Sequence[str]) -> list[str]:
+    """The names of columns in the cells of a first line, without regard to capitals."""
+    return [each.strip().lower() for each in cells]
 
 
 def too_many_cells(file: Path, line: int, cells: int, columns: int) -> InputError:
@@ -81,31 +96,26 @@ def read_table(
 
     Raises InputError naming file, line and column.
     """
-    file, text = Path(path), text_of(path, _TABLE)
-    kept = [
-        (k, line)
-        for k, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    file = Path(path)
+    lines = numbered_cells(file, text_of(path, _TABLE))
     columns = f"Columns: {', '.join(needed)}" + (f"; if wanted {', '.join(optional)}." if optional else ".")
-    if not kept:
+    if not lines:
         raise InputError("is empty", where=str(file), remedy=columns)
-    delimiter = next((each for each in ";\t," if each in kept[0][1]), ",")
-    lines = cells_of(file, kept, delimiter)
-    names = [each.strip().lower() for each in lines[0]]
+    first = lines[0][1]
+    names = names_in(first)
     for name in needed:
         if name not in names:
             raise InputError(
                 f"has no column {name!r} in its first line",
                 where=str(file),
-                value=", ".join(lines[0]),
+                value=", ".join(first),
                 remedy=columns,
             )
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"has two columns {name!r}", where=str(file), remedy="Name each column once.")
     rows = []
-    for (number, _), cells in zip(kept[1:], lines[1:], strict=True):
+    for number, cells in lines[1:]:
         if len(cells) > len(names):
             raise too_many_cells(file, number, len(cells), len(names))
         values = {}
@@ -121,11 +131,8 @@ def read_table(
 
 def has_column(path: str | Path, name: str) -> bool:
     """Whether the first line of a file that can be read names the column."""
-    text = text_of(path, _TABLE)
-    first = next(
-        (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
-    )
-    return name in [each.strip().lower() for each in first.replace(";", ",").replace("\t", ",").split(",")]
+    lines = numbered_cells(Path(path), text_of(path, _TABLE))
+    return bool(lines) and name in names_in(lines[0][1])
 
 
 def nodes_of(path: str | Path, rows: list[MeasuredRow], shell: Gridshell) -> Indices:

@@ -11,6 +11,7 @@ that fits nearly as well makes the match doubtful, which is said and not guessed
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.errors import InputError
 from shellform.site import measurements
-from shellform.site.measurements import cells_of, text_of, too_many_cells
+from shellform.site.measurements import names_in, numbered_cells, text_of, too_many_cells
 from shellform.structure.elements.state import State
 from shellform.surface.units import unit_factor
 
@@ -92,28 +93,22 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
     the first three; lines that start with # and lines whose coordinates are all empty (markers out of sight)
     are passed over. Raises InputError."""
     metres = unit_factor(unit, where="scan.unit")
-    file, text = Path(path), text_of(path, "Give a text file: x, y, z of a point in each line.")
-    numbered = [
-        (k, line)
-        for k, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    delimiter = next((each for each in ";\t," if numbered and each in numbered[0][1]), ",")
-    rows = cells_of(file, numbered, delimiter)
+    file = Path(path)
+    rows = numbered_cells(file, text_of(path, "Give a text file: x, y, z of a point in each line."))
     columns = [0, 1, 2]
-    names = [each.strip().lower() for each in rows[0]] if rows else []
+    names = names_in(rows[0][1]) if rows else []
     named = {"x", "y", "z"} <= set(names)
     if named:
         columns = [names.index(each) for each in "xyz"]
-        rows, numbered = rows[1:], numbered[1:]
+        rows = rows[1:]
     found = []
-    for (line, _), row in zip(numbered, rows, strict=True):
+    for line, row in rows:
         if named and len(row) > len(names):
             raise too_many_cells(file, line, len(row), len(names))
         cells = [row[k].strip() if k < len(row) else "" for k in columns]
         if any(cells):
             try:
-                found.append([float(each) for each in cells])
+                point = [float(each) for each in cells]
             except ValueError as error:
                 raise InputError(
                     "must be three numbers",
@@ -125,6 +120,14 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
                     if named
                     else "Name the columns x, y, z in the first line.",
                 ) from error
+            if not all(map(math.isfinite, point)):
+                raise InputError(
+                    "must be three finite numbers",
+                    where=f"{file}, line {line}",
+                    value=cells,
+                    remedy="Leave the three cells empty where a marker is hidden.",
+                )
+            found.append(point)
     if not found:
         raise InputError(
             "has no points", where=str(file), remedy="Give a text file: x, y, z of a point in each line."

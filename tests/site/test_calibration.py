@@ -201,7 +201,7 @@ def test_scans_are_read_in_their_unit_with_or_without_names(tmp_path):
         ("1,2,3\n4,five,6\n", "line 2"),
         ("1,2\n", "line 1"),
         ("# none\n", "no points"),
-        ("1,2,nan\n", "not finite"),
+        ("1,2,nan\n", "line 1: must be three finite numbers"),
         ("x;y;z\n1,5;2,5;3,5\n", "line 2: must be three numbers.*decimal points"),
         ("x,y,z\n1,5,2,5,3,5\n", "line 2: has 6 cells for 3 columns.*decimal points"),
         ("x,y,z\n1,,3\n", "line 2: must be three numbers.*or none where a marker is hidden"),

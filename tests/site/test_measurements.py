@@ -57,7 +57,7 @@ def test_rows_keep_the_numbers_of_their_lines_and_columns_come_in_any_order_and_
     assert math.isnan(rows[1].values["y"])
 
 
-@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " ", "   "])
 def test_cells_are_parted_by_the_mark_that_the_first_line_has(written, delimiter):
     text = f"x{delimiter}y\n1{delimiter}-2.5e-3\n"
     assert read_table(written(text), ("x", "y")) == [MeasuredRow(2, {"x": 1.0, "y": -0.0025})]
@@ -191,6 +191,12 @@ def test_noise_is_between_a_nanometre_and_a_kilometre():
 
 
 def test_an_open_quotation_mark_is_told_by_its_line(tmp_path):
-    with pytest.raises(InputError, match="line 7: can't be parted"):
-        measurements.cells_of(tmp_path / "a.csv", [(3, "1,2"), (7, '"4,5')], ",")
-    assert measurements.cells_of(tmp_path / "a.csv", [(3, '1; "a;b"')], ";") == [["1", "a;b"]]
+    with pytest.raises(InputError, match="line 4: can't be parted"):
+        measurements.numbered_cells(tmp_path / "a.csv", '# "\n1,2\n\n"4,5\n')
+    assert measurements.numbered_cells(tmp_path / "a.csv", '1; "a;b"') == [(1, ["1", "a;b"])]
+
+
+def test_names_in_quotation_marks_as_other_programs_write_them_are_the_columns_own(written):
+    file = written('"Node","x","y","z"\n"3",1,2,3\n')
+    assert has_column(file, "node")
+    assert read_places(file, SHELL)[0].tolist() == [3]

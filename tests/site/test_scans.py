@@ -9,7 +9,18 @@ from scipy.spatial.transform import Rotation
 
 from shellform.errors import InputError
 from shellform.site import scans
-from shellform.site.scans import Match, Motion, Scan, apart, counted_alike, distances, laid, match, rigid_fit
+from shellform.site.scans import (
+    Match,
+    Motion,
+    Scan,
+    apart,
+    counted_alike,
+    distances,
+    laid,
+    match,
+    read_points,
+    rigid_fit,
+)
 
 MARKERS = np.array(
     [[0, 0, 0], [4, 0, 0.5], [7, 1, 0], [1, 3, 0.9], [5, 4, 0.3], [2, 6, 0], [8, 5, -0.4], [-3, 2, 0.2]]
@@ -240,3 +251,26 @@ def test_markers_without_a_point_have_no_place():
     places = found.places(np.array([[9.0, 9.0, 9.0], [2.0, 3.0, 4.0]]))
     assert places[0] == pytest.approx([-2.0, 2.0, 4.0])
     assert np.isnan(places[1]).all()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0 0 1\n2 -0.5 0\n",
+        " 0  0   1 \n 2 -0.5 0 \n",
+        '"Z" "x" "Y"\n1 0 0\n0 2 -0.5\n',
+        "0\t0\t1\n2\t-0.5\t0\n",
+    ],
+)
+def test_points_may_be_parted_by_blanks_as_scanners_write_them(tmp_path, text):
+    (tmp_path / "scan.xyz").write_text(text, encoding="utf-8")
+    assert read_points(tmp_path / "scan.xyz", unit="mm").tolist() == [
+        [0.0, 0.0, 0.001],
+        [0.002, -0.0005, 0.0],
+    ]
+
+
+def test_a_point_that_is_no_number_is_told_by_its_line(tmp_path):
+    (tmp_path / "scan.csv").write_text("# scan\nx,y,z\n1,2,3\nnan,nan,nan\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"line 4: must be three finite numbers.*Leave the three cells empty"):
+        read_points(tmp_path / "scan.csv")
