@@ -65,7 +65,10 @@ def unreadable(error: Exception) -> str:
 
 
 def require_file(file: Path, *, where: str = "") -> None:
-    """Raises InputError where there is no such file; `where` it is named, unless by itself."""
+    """Raises InputError where there is no such file, or it is a folder; `where` it is named, unless by
+    itself."""
+    if file.is_dir():
+        raise InputError("is a folder, no file", where=where or str(file), remedy="Name a file in it.")
     if not file.is_file():
         raise InputError(
             "there is no such file",

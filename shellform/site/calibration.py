@@ -243,7 +243,7 @@ def _refuse(begun: Sequence[Loaded]) -> None:
     raise NotConverged(
         f"With the start's joint the grid bears {begun[number].share:.2f} of load {number + 1} only",
         state=begun[number].equilibrium.state,
-        remedy="Start from stiffer connectors, or leave this load state out.",
+        remedy="Check that its forces are in N; start from stiffer connectors, or leave this load state out.",
     )
 
 

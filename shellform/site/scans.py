@@ -101,6 +101,13 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
     if named:
         columns = [names.index(each) for each in "xyz"]
         rows = rows[1:]
+    elif rows and _are_numbered([cells for _, cells in rows]):
+        raise InputError(
+            "has points with numbers, and no names of columns",
+            where=str(file),
+            value=", ".join(rows[0][1]),
+            remedy="Name the columns in the first line: x, y, z, and node or crossing where the numbers are those.",
+        )
     found = []
     for line, row in rows:
         if named and len(row) > len(names):
@@ -133,6 +140,12 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
             "has no points", where=str(file), remedy="Give a text file: x, y, z of a point in each line."
         )
     return metres * reals(str(file), found, (None, 3))
+
+
+def _are_numbered(rows: Sequence[Sequence[str]]) -> bool:
+    """Whether each row begins with a whole number of its own and has three cells after it."""
+    first = [row[0] for row in rows]
+    return len(set(first)) == len(first) and all(len(row) > 3 and row[0].isdigit() for row in rows)
 
 
 def counted_alike(

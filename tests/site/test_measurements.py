@@ -133,6 +133,8 @@ def test_groups_come_by_rising_number_and_count_the_design_s_own_cables(written)
 def test_a_table_that_is_not_there_is_said_not_to_be(tmp_path):
     with pytest.raises(InputError, match=r"none.csv: there is no such file. Check the path"):
         read_table(tmp_path / "none.csv", ("x",))
+    with pytest.raises(InputError, match=r"is a folder, no file\. Name a file in it"):
+        read_table(tmp_path, ("x",))
 
 
 def test_supports_on_their_way_come_in_the_order_of_the_net_s_stop_after_stop(written):

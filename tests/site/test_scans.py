@@ -272,5 +272,16 @@ def test_points_may_be_parted_by_blanks_as_scanners_write_them(tmp_path, text):
 
 def test_a_point_that_is_no_number_is_told_by_its_line(tmp_path):
     (tmp_path / "scan.csv").write_text("# scan\nx,y,z\n1,2,3\nnan,nan,nan\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"line 4: must be three finite numbers.*Leave the three cells empty"):
+    with pytest.raises(
+        InputError, match=r"line 4: must be three finite numbers.*Leave the three cells empty"
+    ):
         read_points(tmp_path / "scan.csv")
+
+
+def test_points_with_numbers_and_without_names_of_columns_are_not_taken_for_x_y_and_z(tmp_path):
+    file = tmp_path / "scan.csv"
+    file.write_text("7,0.1,0.2,0.3\n3,0.4,0.5,0.6\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"has points with numbers.*7, 0\.1, 0\.2, 0\.3.*Name the columns"):
+        read_points(file)
+    file.write_text("7.0,0.1,0.2,255\n3.0,0.4,0.5,254\n", encoding="utf-8")
+    assert read_points(file).tolist() == [[7.0, 0.1, 0.2], [3.0, 0.4, 0.5]], "with an intensity"
