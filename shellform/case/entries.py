@@ -14,9 +14,12 @@ from pydantic import (
     NonNegativeFloat,
     PositiveFloat,
     PositiveInt,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
+
+from shellform.gridshell.catalogue import LONGEST_STOCK, WIDEST_CUT
 
 _Polygon = list[tuple[float, float]]
 
@@ -108,6 +111,14 @@ class _BoughtEntry(Entry):
     composite: float = Field(
         0.5, ge=0.0, le=1.0, description="how far two layers act together, 1 as if glued, 0 loose"
     )
+
+    @field_validator("stock_length", "kerf")
+    @classmethod
+    def _in_metres(cls, length: float | None, info: ValidationInfo) -> float | None:
+        most = WIDEST_CUT if info.field_name == "kerf" else LONGEST_STOCK
+        if length is not None and length > most:
+            raise ValueError(f"{length:g} m is too much; for {length:g} mm write {length / 1000.0:g}")
+        return length
 
 
 class OwnRodEntry(_BoughtEntry):

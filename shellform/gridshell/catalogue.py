@@ -39,6 +39,7 @@ from shellform.structure.refusals import refusal
 
 _SHIPPED = Path(__file__).resolve().parent.parent / "catalogues"
 _EQUAL = 1e-9  # relative: stiffnesses that count as equal
+LONGEST_STOCK, WIDEST_CUT = 1000.0, 0.1  # m, of rods on a coil and of a saw: what is more is meant in mm
 
 
 class _Material(msgspec.Struct, forbid_unknown_fields=True):
@@ -121,6 +122,7 @@ def read_catalogue(source: str | Path) -> Catalogue:
         require_number(
             stock,
             above=0.0,
+            most=LONGEST_STOCK,
             where=f"catalogue {path}: stock_length",
             give="metres, such as 6.0, or leave it out",
         )

@@ -170,7 +170,13 @@ def test_splicing_is_said_in_the_list_and_neighbours_are_divided_from_opposite_e
 
 @pytest.mark.parametrize(
     ("stock", "kerf", "word"),
-    [(0.05, 0.0, "can't be spliced"), (-1.0, 0.0, "rod.stock_length"), (1.0, 1.0, "rod.kerf")],
+    [
+        (0.05, 0.0, "can't be spliced"),
+        (-1.0, 0.0, "rod.stock_length"),
+        (6000.0, 0.003, "rod.stock_length.*metres as they are sold"),
+        (1.0, 1.0, "rod.kerf"),
+        (6.0, 3.0, "rod.kerf.*a saw cut's width in metres"),
+    ],
 )
 def test_stock_that_can_not_be_used_is_refused(net, stock, kerf, word):
     with pytest.raises(InputError, match=word):

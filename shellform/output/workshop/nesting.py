@@ -22,6 +22,7 @@ import binpacking
 import numpy as np
 
 from shellform.errors import InputError, require_count, require_number
+from shellform.gridshell.catalogue import LONGEST_STOCK, WIDEST_CUT
 from shellform.net.grid import Grid, GridRod
 
 STOCK = 6.0  # m
@@ -76,11 +77,22 @@ class Cutting:
 
 def cut(grid: Grid, *, stock: float = STOCK, kerf: float = KERF, laths: int = 1) -> Cutting:
     """The grid's rods, each of as many `laths`, nested into bars of the length `stock`, m. Raises InputError
-    where the stock is too short to splice rods from.
+    where the stock is too short to splice rods from, and for lengths that can only be meant in mm.
     """
-    require_number(stock, above=0.0, where="rod.stock_length", give="metres as they are sold, such as 6.0")
     require_number(
-        kerf, least=0.0, below=stock, where="rod.kerf", give="a saw cut's width in metres, such as 0.003"
+        stock,
+        above=0.0,
+        most=LONGEST_STOCK,
+        where="rod.stock_length",
+        give="metres as they are sold, such as 6.0",
+    )
+    require_number(
+        kerf,
+        least=0.0,
+        below=stock,
+        most=WIDEST_CUT,
+        where="rod.kerf",
+        give="a saw cut's width in metres, such as 0.003",
     )
     require_count(laths, where="laths", give="how many laths each rod is of, such as 2")
     pieces: list[Piece] = []
