@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shellform.errors import InputError
+from shellform.errors import InputError, how_many
 from shellform.written import whole, write_text
 
 Value = str | float | int | None
@@ -46,6 +46,10 @@ class Table:
                     value=len(row),
                     remedy=f"Give {len(self.columns)} values, None where one is missing.",
                 )
+
+    def __repr__(self) -> str:
+        rows = how_many(len(self.rows), "row", "rows")
+        return f"Table({self.name!r}, {rows} of {', '.join(self.columns)})"
 
     def records(self) -> list[dict[str, Value]]:
         """A dictionary by head for each row: what `pandas.DataFrame` takes."""

@@ -124,3 +124,10 @@ def test_a_workbook_tells_no_time_at_which_it_was_made(tmp_path):
         told = book.read("docProps/core.xml").decode()
     assert told.count("1980-01-01T00:00:00Z") == 2
     assert len(re.findall(r"\d{4}-\d\d-\d\dT", told)) == 2
+
+
+def test_a_table_is_shown_by_its_size_and_heads():
+    assert (
+        repr(Table("rods", ("rod", "length [m]"), (("A1", 1.0),)))
+        == "Table('rods', 1 row of rod, length [m])"
+    )
