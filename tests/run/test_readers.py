@@ -1,6 +1,7 @@
 """The scripts that open a run in Blender and in Grasshopper, run in plain Python against a run folder, with
 stand-ins for what these programs bring."""
 
+import json
 import math
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
+from shellform.output.exchange import vtp
 from shellform.output.exchange.run_readers import PROGRAMS, reader, write_readers
 from shellform.output.workshop.schedules import rod_names
 from shellform.problem.paths import deviations
@@ -27,6 +29,19 @@ def ran(program, **names):
     given = {"__name__": "read", **names}
     exec(compile(reader(program), program, "exec"), given)
     return SimpleNamespace(**given)
+
+
+def written_run(folder, designs, shown, places, lines, *, rods, supports):
+    """What the scripts read of a run folder."""
+    summary = {"designs": {name: {"rod_radius": 0.01} for name in designs}}
+    net = {"rods": [{"direction": "u"}] * rods, "supports": supports}
+    for name, content in (("summary", summary), ("net", net)):
+        (folder / f"{name}.json").write_text(json.dumps(content), encoding="utf-8")
+    (folder / "states").mkdir()
+    vtp.write_lines(
+        folder / f"states/{shown}-design.vtp", places, lines, np.zeros((0, 2), dtype=int),
+        {"deviation": np.zeros(len(places))}, {"cable_force": np.zeros(len(lines))},
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -56,6 +71,34 @@ def test_rods_and_cables_are_those_of_the_run_with_their_names_and_numbers(folde
     assert not other["cables"]
     with pytest.raises(IOError, match="name a design and a load"):
         ran("blender").read_run(str(folder), "unbraced", "snow")
+
+
+@pytest.mark.parametrize(
+    ("made", "shown"),
+    [
+        (("unbraced", "initial", "optimised", "polished", "unloaded"), "polished"),
+        (("unbraced", "initial", "optimised", "unloaded"), "optimised"),
+        (("unbraced", "initial"), "initial"),
+    ],
+)
+def test_of_a_run_that_was_not_judged_the_last_design_is_shown_and_never_the_one_to_compare_with(
+    tmp_path, made, shown
+):
+    written_run(tmp_path, made, shown, [[0, 0, 0], [1, 0, 0]], [[0, 1]], rods=1, supports=[])
+    assert ran("blender").read_run(str(tmp_path))["design"] == shown
+
+
+def test_edge_beams_that_meet_in_a_foot_are_drawn_each_for_itself(tmp_path):
+    """A rod, two edge beams from foot to foot that share one, and a ring."""
+    places = [[0, 0, 0], [1, 0, 1], [2, 0, 0], [3, 0, 1], [4, 0, 0], [0, 1, 1], [1, 1, 1], [1, 2, 1]]
+    lines = [[5, 6], [0, 1], [1, 2], [2, 3], [3, 4], [5, 6], [6, 7], [7, 5]]
+    written_run(
+        tmp_path, ("initial",), "initial", places, lines, rods=1, supports=[places[k] for k in (0, 2, 4)]
+    )
+    found = ran("blender").read_run(str(tmp_path))["rods"]
+    assert [(rod["name"], rod["nodes"]) for rod in found] == [
+        ("U0", [5, 6]), ("E0", [0, 1, 2]), ("E1", [2, 3, 4]), ("E2", [5, 6, 7, 5]),
+    ]  # fmt: skip
 
 
 def test_blender_gets_a_tube_for_each_rod_and_cable(folder, monkeypatch):
