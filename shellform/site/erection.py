@@ -290,11 +290,22 @@ def _teams(design: Design, groups: Sequence[ArrayLike] | None) -> list[Indices]:
         indices(f"groups[{k}]", each, (None,), below=len(design.present)) for k, each in enumerate(groups)
     ]
     together = np.concatenate([np.zeros(0, dtype=np.int64), *teams])
-    if not np.array_equal(np.sort(together), present):
+    count = np.bincount(together, minlength=len(design.present))
+    off = np.flatnonzero(count != design.present)
+    if len(off):
+        times = int(count[off[0]])
         raise InputError(
-            "must hold every cable of the design once",
+            "must hold every cable of the design once"
+            if design.present[off[0]]
+            else "holds a candidate that is no cable of the design",
             where="groups",
-            value=len(together),
-            remedy=f"There are {len(present)} cables.",
+            value=f"{_called(off[0], present)} {'in none' if times == 0 else f'{times} times'}",
+            remedy=f"Give each of the {len(present)} cables one row, with the group in which it is tightened.",
         )
     return teams
+
+
+def _called(candidate: int, present: Indices) -> str:
+    """A cable's name in the drawings, where it is one of the `present` ones."""
+    at = np.flatnonzero(present == candidate)
+    return f"C{at[0]}" if len(at) else f"candidate {candidate}"

@@ -293,7 +293,9 @@ def _number(cell: str, where: str, may_be_empty: bool) -> float:
         value = float(cell)
     except ValueError as error:
         named = _NAMED.fullmatch(cell)
-        remedy = f"Write its number alone: {named[1]}." if named else "Write it with a decimal point: 0.0125."
+        remedy = "Write its number alone, such as 12, or a decimal one with a point, such as 0.0125."
+        if named:
+            remedy = f"Write its number alone: {named[1]}."
         raise InputError("must be a number", where=where, value=cell, remedy=remedy) from error
     if not math.isfinite(value):
         raise InputError(

@@ -284,8 +284,13 @@ def test_groups_hold_every_present_cable_once():
     assert [team.tolist() for team in erection._teams(design, None)] == [[0, 2, 3]]
     assert [team.tolist() for team in erection._teams(design, [[3], [0, 2]])] == [[3], [0, 2]]
     assert erection._teams(SimpleNamespace(present=np.zeros(3, dtype=bool)), None) == []
-    for groups in ([[0, 2]], [[0, 2], [3, 0]], [[0, 1, 2, 3]], []):
-        with pytest.raises(InputError, match=r"every cable of the design once.*There are 3 cables"):
+    for groups, said in (
+        ([[0, 2]], r"every cable of the design once \(found 'C2 in none'\)"),
+        ([[0, 2], [3, 0]], r"every cable of the design once \(found 'C0 2 times'\)"),
+        ([[0, 1, 2, 3]], r"no cable of the design \(found 'candidate 1 1 times'\)"),
+        ([], r"every cable of the design once \(found 'C0 in none'\)"),
+    ):
+        with pytest.raises(InputError, match=said + ".*each of the 3 cables one row"):
             erection._teams(design, groups)
 
 

@@ -125,6 +125,7 @@ def test_groups_come_by_rising_number_and_count_the_design_s_own_cables(written)
     for text, said in [
         ("3,1", r"line 2: cable: must be a whole number from 0 to 2 \(found 3\)"),
         ("C1,1", r"line 2: cable: must be a number \(found 'C1'\). Write its number alone: 1\."),
+        ("1,A", r"line 2: group: must be a number \(found 'A'\). Write its number alone, such as 12"),
     ]:
         with pytest.raises(InputError, match=said):
             read_groups(written(f"cable,group\n{text}\n"), design)
