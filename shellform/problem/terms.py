@@ -49,6 +49,10 @@ class Squares(Record):
     by_dof: sp.csr_array
 
 
+class NotANumber(InputError):
+    """A term whose value is nan, or a derivative of which is nan or infinite."""
+
+
 @dataclass(frozen=True, eq=False)
 class Measurement(Record):
     """The `value` (g,) of a term and its partial derivatives: `by_dof` (g, 6 n) sparse, by the nodes'
@@ -76,7 +80,8 @@ class Measurement(Record):
         return self if self.late is None else self.late()
 
     def completed(self, size: int, nodes: int, cables: int, name: str) -> Measurement:
-        """With zeros in the place of None. Raises InputError where a shape isn't as said."""
+        """With zeros in the place of None. Raises InputError where a shape isn't as said, NotANumber where a
+        derivative is no finite number."""
         shapes = {"by_dof": (size, 6 * nodes), "by_rest_length": (size, cables)}
         made = {each: getattr(self, each) for each in shapes}
         rate = np.zeros(size) if self.by_radius is None else np.asarray(self.by_radius, dtype=float)
@@ -90,6 +95,14 @@ class Measurement(Record):
                     remedy="Give arrays of those shapes, or another size.",
                 )
         rows = {each: sp.csr_array(shapes[each] if found is None else found) for each, found in made.items()}
+        for each, rates in {"by_radius": rate, **{each: found.data for each, found in rows.items()}}.items():
+            if np.isfinite(self.value).all() and not np.isfinite(rates).all():
+                raise NotANumber(
+                    "has a derivative that is no finite number",
+                    where=f"{name}.{each}",
+                    value=float(rates[~np.isfinite(rates)][0]),
+                    remedy="Let the term be smooth wherever a design has an equilibrium.",
+                )
         return Measurement(
             np.asarray(self.value, dtype=float),
             rows["by_dof"],
@@ -134,14 +147,17 @@ class Term(ABC):
         return False
 
 
-class NotANumber(InputError):
-    """A term whose value is nan."""
-
-
 def measured(term: Term, at: LoadedDesign) -> Measurement:
     """The term's measurement, complete but for derivatives that come late. Raises InputError where its shapes
-    aren't those that it says, NotANumber where a value is none."""
+    aren't those that it says, NotANumber where a value or a derivative is none."""
     shell, found = at.shell, term.measure(at)
+    if not isinstance(found, Measurement):
+        raise InputError(
+            "is no sf.Measurement",
+            where=f"{term.name}.measure",
+            value=type(found).__name__,
+            remedy="Return sf.Measurement(values, by_dof), whose arrays have a row for each value.",
+        )
     if np.isnan(np.asarray(found.value, dtype=float)).any():
         raise NotANumber(
             "is no number",

@@ -389,6 +389,40 @@ def test_a_term_that_is_no_number_is_refused_at_the_start_and_refuses_designs_la
         assert best.rejected > 0
 
 
+@dataclass(frozen=True)
+class Steep(Height):  # its derivatives say what they are told to
+    rate: float = 1.0
+    late: bool = False
+
+    def measure(self, at):
+        found = super().measure(at)
+        steep = replace(found, by_dof=np.where(found.by_dof == 0.0, 0.0, self.rate))
+        return replace(found, by_dof=None, late=lambda: steep) if self.late else steep
+
+
+@pytest.mark.parametrize("late", [False, True])
+@pytest.mark.parametrize("rate", [np.nan, -np.inf])
+def test_a_derivative_that_is_no_number_is_refused_and_not_searched_with(coarse, rate, late):
+    """The search ended where it began, and said nothing."""
+    steep = Steep("wet", rate=rate, late=late)
+    asked = problem(coarse, variables=[sf.RestLengths()], minimise=[sf.Share(1.0, steep)])
+    for solver in (sf.SequentialConvex(), sf.MovingAsymptotes()):
+        with pytest.raises(sf.InputError, match=r"height\.by_dof: has a derivative that is no finite number"):
+            sf.optimise(asked, coarse.design(), solver=solver, evaluations=2)
+
+
+@dataclass(frozen=True)
+class Bare(Height):  # the value alone
+    def measure(self, at):
+        return float(super().measure(at).value[0])
+
+
+def test_a_term_that_gives_no_measurement_is_told_what_to_return(coarse):
+    asked = problem(coarse, variables=[sf.RestLengths()], minimise=[sf.Share(1.0, Bare("wet"))])
+    with pytest.raises(sf.InputError, match=r"height\.measure: is no sf\.Measurement \(found 'float'\)"):
+        sf.optimise(asked, coarse.design(), evaluations=1)
+
+
 @pytest.mark.parametrize("solver", [sf.SequentialConvex(), sf.MovingAsymptotes()])
 def test_lengths_that_can_not_vary_are_refused(coarse, solver):
     asked = problem(coarse, variables=[sf.RestLengths(least=0.5)])
