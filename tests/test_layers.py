@@ -20,7 +20,7 @@ PACKAGE = Path(__file__).parent.parent / "shellform"
 FLOORS = {
     "shellform": [
         ["errors", "work_clock", "lazy", "processes"],
-        ["compiled"],
+        ["compiled", "quantities"],
         ["arrays", "written"],
         ["tables"],
         ["structure"],

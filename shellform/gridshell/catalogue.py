@@ -22,7 +22,9 @@ from shellform.errors import InputError, require_count, require_number, unreadab
 from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.gridshell import Design, Gridshell, Rod, TooCurved, erection_stress
 from shellform.gridshell.layers import TwoLayers
+from shellform.gridshell.possible_rods import require_rods_material
 from shellform.net.net import Net
+from shellform.quantities import DIAMETER, STOCK_LENGTH
 from shellform.structure.elements.sections import (
     SHAPES,
     Material,
@@ -119,13 +121,7 @@ def read_catalogue(source: str | Path) -> Catalogue:
         )
     stock = document.stock_length
     if stock is not None:
-        require_number(
-            stock,
-            above=0.0,
-            most=LONGEST_STOCK,
-            where=f"catalogue {path}: stock_length",
-            give="metres, such as 6.0, or leave it out",
-        )
+        STOCK_LENGTH.require(stock, where=f"catalogue {path}: stock_length")
     return Catalogue(document.title or path.stem, material, tuple(sorted(sections, key=_order)), stock)
 
 
@@ -145,6 +141,7 @@ def _material(given: _Material) -> Material:
         share=True,
     )
     strength = given.strength * given.lasting
+    require_rods_material(given.young, given.shear, strength, given.density, where="material")
     if given.shear is None:
         return isotropic(
             young=given.young, poisson=given.poisson or 0.0, density=given.density, strength=strength
@@ -155,6 +152,8 @@ def _material(given: _Material) -> Material:
 def _bought(shape: str, size: float | tuple[float, float], material: Material) -> Section:
     """A section from the size by which it is sold: of what has a radius, the diameter comes first."""
     sizes = [size] if isinstance(size, float) else list(size)
+    for each in sizes:
+        DIAMETER.require(each)
     if "radius" in sizes_of(shape):
         sizes[0] *= 0.5
     return make_section(shape, sizes, material)

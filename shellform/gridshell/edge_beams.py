@@ -27,6 +27,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, require_count, require_number
 from shellform.gridshell.loads import GRAVITY
+from shellform.gridshell.possible_rods import require_section
 from shellform.net.net import Net
 from shellform.structure.elements.beam import Beams, built_in, joined
 from shellform.structure.elements.rotation import matrices
@@ -117,6 +118,9 @@ class EdgeBeam:
     surface."""
 
     section: Section
+
+    def __post_init__(self) -> None:
+        require_section(self.section, where="edges.beam")
 
     @property
     def stiffness(self) -> BeamStiffness:

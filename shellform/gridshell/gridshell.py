@@ -18,11 +18,14 @@ from numpy.typing import ArrayLike
 
 from shellform.arrays import Flags, Indices, Reals, Record, flags, indices, reals
 from shellform.errors import InputError, require_number
+from shellform.gridshell.candidates import candidate_cables
 from shellform.gridshell.edge_beams import EdgeBeam, edge_beams
 from shellform.gridshell.layers import LOCK, locks, rod_bending_stress, rod_forces, rod_stress
 from shellform.gridshell.loads import points
-from shellform.net.grid import ROD, cells, edge_diagonals, grid_beams
+from shellform.gridshell.possible_rods import refuse_thick, require_section
+from shellform.net.grid import ROD, grid_beams
 from shellform.net.net import Net
+from shellform.quantities import GAP
 from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.sections import (
@@ -35,11 +38,9 @@ from shellform.structure.elements.sections import (
 )
 from shellform.structure.elements.state import State
 from shellform.structure.network import Network
-from shellform.surface.shape.locate import Locator
 from shellform.surface.shape.target import Surface
 
 _RADII = 8  # whose beams are kept
-_SAMPLES = (0.25, 0.5, 0.75)  # where along a cable its height over the surface is taken
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,9 @@ class Rod:
     """
 
     section: Section
+
+    def __post_init__(self) -> None:
+        require_section(self.section, where="rod.section")
 
     @classmethod
     def round(
@@ -109,7 +113,7 @@ _JOINT_UNITS = {
     "axial": "EA in newtons, such as 7.15e4",
     "torsion": "GJ in N·m², such as 7.38e-4",
     "bending": "EI in N·m², such as 7.85e-4",
-    "gap": "metres between the rods' axes, at least a rod's diameter, such as 0.0024",
+    "gap": GAP.give,
 }
 
 
@@ -127,6 +131,7 @@ class Joint:
     def __post_init__(self) -> None:
         for name, unit in _JOINT_UNITS.items():
             require_number(getattr(self, name), above=0.0, where=f"joint.{name}", give=unit)
+        GAP.require(self.gap, where="joint.gap")
 
     @property
     def stiffness(self) -> BeamStiffness:
@@ -374,6 +379,7 @@ def brace(
             value=joint.gap,
             remedy="Pull the net with the joint's gap.",
         )
+    refuse_thick(rod.section.fibres[0], 2.0, min(net.grid.spacing, net.grid.spacing_v), where="rod.radius")
     bearable = max_radius(net, rod)
     if rod.radius > bearable * (1.0 + 1e-9):
         raise TooCurved(
@@ -386,14 +392,5 @@ def brace(
             "surface.",
             radius=rod.radius / bearable / net.quality.curvature_max,
         )
-    corners = cells(net.grid)
-    pairs = [corners[:, [0, 2]], corners[:, [1, 3]]]
-    if edge_cells:
-        pairs.append(edge_diagonals(net.grid))
-    ends = net.grid.crossing_nodes[:, 0][np.vstack(pairs)]
-    place = net.target.positions[ends]
-    finder = Locator(below)
-    above = np.zeros(len(ends), dtype=bool)
-    for share in _SAMPLES:
-        above |= finder.foot((1.0 - share) * place[:, 0] + share * place[:, 1]).distance > 0.0
-    return Gridshell(net, rod, joint, cable, ends[~above], edge)
+    candidates = candidate_cables(net, below, edge_cells=edge_cells)
+    return Gridshell(net, rod, joint, cable, candidates, edge)

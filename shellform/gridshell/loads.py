@@ -22,11 +22,20 @@ from shellform.errors import InputError, require_angle, require_count, require_k
 from shellform.gridshell.areas import areas, between, facets, tributary, within
 from shellform.net.net import Net
 from shellform.net.polylines import inside
+from shellform.quantities import (
+    AREA_MASS,
+    CONCRETE_DENSITY,
+    JOINT_MASS,
+    LENGTHS,
+    THICKNESS,
+    if_other_unit,
+)
 from shellform.structure.elements.sections import Section, mass_per_length
 from shellform.surface.shape.target import Surface
 
 GRAVITY = 9.81  # m/s²: the paper's 700 g are 6.9 N
 CONCRETE = 2500.0  # kg/m³, wet, with its reinforcement
+_BULK = 0.2  # of the larger side: thicker, it is no shell
 
 
 @dataclass(frozen=True)
@@ -115,14 +124,36 @@ def _coordinates(point: Reals) -> str:
 
 def pressure(thickness: float, density: float) -> float:
     """Weight, N/m², of a layer of `thickness`, m, across the surface, and `density`, kg/m³."""
-    return GRAVITY * _positive("thickness", thickness) * _positive("density", density)
+    THICKNESS.require(thickness, where="load.thickness")
+    return GRAVITY * thickness * CONCRETE_DENSITY.require(density, where="load.density")
+
+
+def as_concrete(weight: float) -> str:
+    """What a weight, N/m², is like."""
+    thickness = weight / (GRAVITY * CONCRETE)
+    size = f"{thickness:.2g} m" if thickness >= 1.0 else f"{1e3 * thickness:.2g} mm"
+    return f"{weight:.3g} N/m², as {size} of concrete"
+
+
+def refuse_bulk(surface: Surface, thickness: float, *, where: str) -> None:
+    """Raises InputError for a layer of a thickness, m, given `where`, with which the surface would be a block
+    and no shell."""
+    side = float(surface.size.max())
+    if thickness > _BULK * side:
+        raise InputError(
+            f"makes a block of a surface of {side:.4g} m",
+            where=where,
+            value=thickness,
+            remedy=f"Give metres, such as {side / 80.0:.1g}.{if_other_unit(thickness, LENGTHS, side / 1000.0, side / 15.0)}",
+        )
 
 
 def area_load(net: Net, surface: Surface, weight: float, region: Region = EVERYWHERE) -> Reals:
     """Load (n, 6) of a `weight`, N/m² of the surface, in the region. It adds up to the weight times the
     region's area.
     """
-    return _down(_positive("weight", weight) * tributary(net, lying(surface, region)))
+    require_number(weight, above=0.0, where="load.weight", give="N/m², such as 120")
+    return _down(weight * tributary(net, lying(surface, region)))
 
 
 def concrete(
@@ -131,12 +162,14 @@ def concrete(
     """Load (n, 6) of wet concrete of a thickness, m, across the surface, and a density, kg/m³, where it is
     poured.
     """
-    return area_load(net, surface, pressure(thickness, density), region)
+    weight = pressure(thickness, density)
+    refuse_bulk(surface, thickness, where="load.thickness")
+    return area_load(net, surface, weight, region)
 
 
 def sheet(net: Net, surface: Surface, mass: float, region: Region = EVERYWHERE) -> Reals:
     """Load (n, 6) of a membrane or of reinforcement of `mass`, kg/m²."""
-    return area_load(net, surface, GRAVITY * _positive("mass", mass), region)
+    return area_load(net, surface, GRAVITY * AREA_MASS.require(mass, where="load.mass"), region)
 
 
 def rods(net: Net, section: Section) -> Reals:
@@ -156,7 +189,7 @@ def rods(net: Net, section: Section) -> Reals:
 def joints(net: Net, mass: float) -> Reals:
     """Load (n, 6) of joints of `mass`, kg, each, half on either rod."""
     weight = np.zeros(net.node_count)
-    weight[net.grid.crossing_nodes] = 0.5 * GRAVITY * _positive("mass", mass)
+    weight[net.grid.crossing_nodes] = 0.5 * GRAVITY * JOINT_MASS.require(mass, where="load.mass")
     return _down(weight)
 
 
@@ -273,19 +306,6 @@ def _down(weight: Reals) -> Reals:
     load = np.zeros((len(weight), 6))
     load[:, 2] = -weight
     return load
-
-
-_UNITS = {
-    "thickness": "metres of concrete, such as 0.005",
-    "density": "kg/m³, such as 2400",
-    "weight": "N/m², such as 120",
-    "mass": "kilograms, such as 0.05",
-}
-
-
-def _positive(name: str, value: float) -> float:
-    require_number(value, above=0.0, where=f"load.{name}", give=_UNITS[name])
-    return value
 
 
 _ANGLE = "a direction in plan in radians, such as 1.57"

@@ -17,9 +17,11 @@ import numpy as np
 
 from shellform.errors import InputError, if_per_cents, require_known, require_number
 from shellform.gridshell.gridshell import Gridshell
+from shellform.quantities import PLACE_DEVIATION
 
 SCALE_MODEL_BELOW: Final = 2.0  # m of span
 LARGEST_SHARE: Final = 0.5  # relative deviations beyond this are no tolerances
+LENGTHS: Final = ("cable_length", "supports", "marks")  # the deviations that are lengths
 
 SOURCES: Final[Mapping[str, str]] = {
     "cable_length": "cut length and turnbuckle: EN 1090-2 annex B, length of a cut member, 2 mm + L/5000; "
@@ -86,10 +88,12 @@ class Tolerances:
     def __post_init__(self) -> None:
         for each in fields(self):
             value, where = getattr(self, each.name), f"tolerances.{each.name}"
-            length = each.name in ("cable_length", "supports", "marks")
+            length = each.name in LENGTHS
             give = "metres, such as 0.0001" if length else "a share, such as 0.03 for 3 %"
             require_number(value, least=0.0, where=where, give=f"{give}, or 0 for none")
-            if not length and value > LARGEST_SHARE:
+            if length:
+                PLACE_DEVIATION.require(value, where=where, least=0.0)
+            elif value > LARGEST_SHARE:
                 raise InputError(
                     f"is a share and must not exceed {LARGEST_SHARE:g}",
                     where=where,
@@ -141,9 +145,9 @@ def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float)
 
 
 def enlarged(tolerances: Tolerances, factor: float) -> Tolerances:
-    """The same causes with deviations larger by a factor, as far as shares go."""
-    lengths = ("cable_length", "supports", "marks")
-    most = {each.name: np.inf if each.name in lengths else LARGEST_SHARE for each in fields(Tolerances)}
+    """The same causes with deviations larger by a factor, as far as they may go."""
+    farthest = PLACE_DEVIATION.possible[1]
+    most = {each.name: farthest if each.name in LENGTHS else LARGEST_SHARE for each in fields(Tolerances)}
     return Tolerances(**{name: min(factor * getattr(tolerances, name), own) for name, own in most.items()})
 
 

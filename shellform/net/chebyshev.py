@@ -40,6 +40,7 @@ from shellform.net.pull import (
 from shellform.net.quality import measure, nearness, refuse_distance, refuse_folds
 from shellform.net.refusal import NoNet, Reason
 from shellform.net.trim import Limits, Trimmed, Uncovered, bare_rods, trim
+from shellform.quantities import LENGTHS, MILLIMETRES, if_other_unit
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.locate import Locator
 from shellform.surface.shape.target import Surface
@@ -228,21 +229,24 @@ def _check(surface: Surface, settings: NetSettings) -> None:
                 f"is too large for a surface of {surface.size[0]:.3g} × {surface.size[1]:.3g} m in plan",
                 where=name,
                 value=spacing,
-                remedy="Choose a smaller spacing, or check the surface's unit.",
+                remedy="Choose a smaller spacing, or check the surface's unit."
+                + if_other_unit(spacing, LENGTHS, extent / 100.0, narrow / 4.0),
             )
         if spacing < extent / 2000.0:
             raise InputError(
                 f"is too small for a surface {extent:.4g} m wide: more than a million crossings",
                 where=name,
                 value=spacing,
-                remedy="Choose a larger spacing, or check the surface's unit.",
+                remedy="Choose a larger spacing, or check the surface's unit."
+                + if_other_unit(spacing, LENGTHS, extent / 100.0, narrow / 4.0),
             )
     if not 0.0 < gap < 0.5 * min(steps):
         raise InputError(
             "must be positive and well below the spacing",
             where="joint.gap",
             value=gap,
-            remedy=f"Give metres below {0.5 * min(steps):.3g}, at least a rod's diameter.",
+            remedy=f"Give metres below {0.5 * min(steps):.3g}, at least a rod's diameter."
+            + if_other_unit(gap, MILLIMETRES, 0.002 * min(steps), 0.4 * min(steps)),
         )
     require_count(settings.elements, where="net.elements", give="beam elements a segment, such as 4")
     give = "a share of the spacing, such as 0.2"

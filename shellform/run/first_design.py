@@ -20,7 +20,7 @@ from dataclasses import replace
 from shellform.errors import InputError
 from shellform.gridshell.joints import turning_stress, usual_gap
 from shellform.gridshell.layers import layers_of
-from shellform.gridshell.loads import CONCRETE, pressure
+from shellform.gridshell.loads import CONCRETE, pressure, refuse_bulk
 from shellform.net.edges import Edges, stand
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_edges import HEAVY, EdgeChoice, edge_choices
@@ -99,6 +99,8 @@ def standing_design(surface: Surface, wish: DesignWish, say: Say, allowance: All
     covers or no rod follows, NotConverged where nothing stands; both with the reason and a way out."""
     refuse_size(surface)
     refuse_flat(surface)
+    if wish.thickness is not None:
+        refuse_bulk(surface, wish.thickness, where="--thickness")
     return _Search(surface, wish, say, allowance).that_holds()
 
 

@@ -24,6 +24,7 @@ from shellform.errors import (
     require_known,
 )
 from shellform.gridshell.gridshell import Gridshell
+from shellform.quantities import PLACE_DEVIATION, TURN
 from shellform.records.words import number
 from shellform.run.folder import Run, read_run
 from shellform.run.site_sources import design_named, load_named, scan_under, scanned
@@ -65,6 +66,7 @@ def calibrate(
     a case says; LOAD is a load case or a CSV file of forces. Writes calibration.csv and calibration.toml.
     Raises InputError, NotConverged."""
     measurements.check_noise(noise)
+    PLACE_DEVIATION.require(noise, where="--noise")
     grid = scanned(source, design, output, allow_scripts=allow_scripts)
     shell = grid.shell
     pairs = [scan_under(each, grid, unit, None if placed else 0) for each in scans]
@@ -103,6 +105,12 @@ class Survey:
     largest: float = 1.5e-3
     cables: int = 60
     after: Path | None = None
+
+    def __post_init__(self) -> None:
+        PLACE_DEVIATION.require(self.noise, where="--noise")
+        PLACE_DEVIATION.require(self.length_error, where="--length-error")
+        TURN.require(self.step, where="--step")
+        TURN.require(self.largest, where="--largest")
 
     @property
     def crew(self) -> retensioning.Crew:

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shellform import quantities
 from shellform.errors import InputError, require_number
 from shellform.gridshell.catalogue import Catalogue, label, named, read_catalogue
 from shellform.gridshell.gridshell import erection_stress
@@ -122,6 +123,10 @@ class DesignWish:
                 require_number(
                     value, above=0.0, where=f"--{name}", give="metres, such as 0.05, or leave it out"
                 )
+        if self.thickness is not None:
+            quantities.THICKNESS.require(self.thickness, where="--thickness")
+        if self.spacing is not None:
+            quantities.SPACING.require(self.spacing, where="--spacing")
         if self.angle is not None and not math.isfinite(self.angle):
             raise InputError(
                 "must be degrees or auto", where="--angle", value=self.angle, remedy="For example --angle 45."

@@ -7,6 +7,7 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError
+from shellform.gridshell import candidates
 from shellform.gridshell import gridshell as module
 from shellform.gridshell.gridshell import Gridshell, TooCurved, brace
 from shellform.gridshell.layers import LOCK
@@ -129,7 +130,8 @@ def test_a_round_rod_of_a_material_that_is_not_told_contracts_by_three_tenths():
 CURVATURE = np.zeros((2, 2, 2))
 CURVATURE[1, 0] = [0.3, -0.4]  # of a round rod 0.5 / m together
 NET = SimpleNamespace(
-    quality=SimpleNamespace(curvature=CURVATURE, curvature_max=0.5), grid=SimpleNamespace(gap=0.05)
+    quality=SimpleNamespace(curvature=CURVATURE, curvature_max=0.5),
+    grid=SimpleNamespace(gap=0.05, spacing=1.0, spacing_v=1.0),
 )
 
 
@@ -143,7 +145,7 @@ def test_rods_are_refused_beyond_the_radius_that_equation_1_leaves_them(monkeypa
     def cells(_grid):
         raise Braced
 
-    monkeypatch.setattr(module, "cells", cells)
+    monkeypatch.setattr(candidates, "cells", cells)
     joint = sf.Joint(axial=5.0, torsion=6.0, bending=8.0, gap=0.05)
 
     def tried(radius, gap=0.05):
@@ -170,14 +172,18 @@ def test_no_cable_is_laid_that_rises_above_the_surface_at_a_quarter_a_half_or_th
     """Along x by one metre each, by y which of them it is; what is below is above where told."""
     lattice = np.arange(4)
     place = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [4.0, 0.0, 0.0], [5.0, 1.0, 0.0]])
-    grid = SimpleNamespace(gap=0.05, crossing_nodes=np.column_stack([lattice, lattice]))
+    grid = SimpleNamespace(
+        gap=0.05, spacing=1.0, spacing_v=1.0, crossing_nodes=np.column_stack([lattice, lattice])
+    )
     net = SimpleNamespace(
         quality=SimpleNamespace(curvature=0.0 * CURVATURE, curvature_max=0.0),
         grid=grid,
         target=SimpleNamespace(positions=place),
     )
-    monkeypatch.setattr(module, "cells", lambda _grid: np.array([[0, 1, 2, 3]]))  # cables 0-2 and 1-3 of 4 m
-    monkeypatch.setattr(module, "edge_diagonals", lambda _grid: np.array([[0, 3]]))
+    monkeypatch.setattr(
+        candidates, "cells", lambda _grid: np.array([[0, 1, 2, 3]])
+    )  # cables 0-2 and 1-3 of 4 m
+    monkeypatch.setattr(candidates, "edge_diagonals", lambda _grid: np.array([[0, 3]]))
     monkeypatch.setattr(module, "Gridshell", lambda *given: given)
 
     def laid(high, **how):
@@ -185,7 +191,7 @@ def test_no_cable_is_laid_that_rises_above_the_surface_at_a_quarter_a_half_or_th
             away = np.array([np.abs(points - np.array(spot)).max(axis=1) < 1e-9 for spot in high])
             return SimpleNamespace(distance=np.where(away.any(axis=0), 0.01, -0.02))
 
-        monkeypatch.setattr(module, "Locator", lambda _surface: SimpleNamespace(foot=foot))
+        monkeypatch.setattr(candidates, "Locator", lambda _surface: SimpleNamespace(foot=foot))
         rod = sf.Rod.round(young=40e9, radius=0.004)
         joint = sf.Joint(axial=5.0, torsion=6.0, bending=8.0, gap=0.05)
         return brace(net, rod, joint, sf.Cable(stiffness=1.0), below=None, **how)[4].tolist()

@@ -91,6 +91,9 @@ def test_a_surface_with_a_spike_is_refused(vault):
     ("settings", "said"),
     [
         ({"spacing": 0.5, "gap": 0.002}, "too large"),
+        ({"spacing": 55.0, "gap": 0.002}, "too large.* For 55 mm write 0.055"),
+        ({"spacing": 5.5e-5, "gap": 1e-6}, "too small.* For 55 mm write 0.055"),
+        ({"spacing": 0.055, "gap": 2.0}, "joint.gap.* For 2 mm write 0.002"),
         ({"spacing": 1e-5, "gap": 1e-6}, "too small"),
         ({"spacing": -1.0, "gap": 0.002}, "positive"),
         ({"spacing": 0.055, "gap": 0.05}, "below the spacing"),

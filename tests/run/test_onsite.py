@@ -299,9 +299,9 @@ def test_bad_options_are_refused(folder, tmp_path):
         with pytest.raises(InputError, match=said):
             onsite.survey(folder, good, onsite.Survey(**options))
     for crew, said in (
-        ({"step": 0.0}, r"crew\.step"),
+        ({"step": 0.0}, "--step"),
         ({"cables": 0}, r"crew\.cables"),
-        ({"step": 1.0}, "more than the largest"),
+        ({"step": 0.1}, "more than the largest"),
     ):
         with pytest.raises(InputError, match=said):
             onsite.replay(folder, onsite.Survey(**crew), rounds=1, seed=0, slip=0.0)

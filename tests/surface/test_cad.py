@@ -197,6 +197,13 @@ def test_a_mesh_of_millions_of_triangles_is_refused_before_it_is_made():
         cad.mesh_plan([square], size=1e-6)
 
 
+def test_a_mesh_size_of_many_times_the_surface_is_refused_with_the_number_to_write():
+    with pytest.raises(InputError, match=r"surface\.size: is 11.1 times .* For 10 mm write 0\.01\."):
+        cad.build_surface(DOME, size=10.0)
+    with pytest.raises(InputError, match=r"more than 2,000,000 triangles.* For 10 mm write 0\.01\."):
+        cad.build_surface(DOME, size=1e-5)
+
+
 def test_a_mesh_size_that_is_named_as_possible_is_taken(monkeypatch):
     monkeypatch.setattr(draft, "MOST_TRIANGLES", 2000)
     with pytest.raises(InputError, match="more than 2,000 triangles") as refused:

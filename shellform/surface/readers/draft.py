@@ -13,11 +13,13 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many, require_number
+from shellform.quantities import LENGTHS, if_other_unit
 
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000  # of one surface: they take 4 GB (allowance.py)
 MOST_BYTES = 512 * 1024**2  # of one file
 _NAMES_TOLD = 12  # of layers and objects, in one message
+_COARSE = 2.0  # times a surface's larger side: no triangle of it is so large
 _TRIANGLES = 2.5  # in a square of the mesh size, with what a surface's rise adds to its plan
 _ENTRIES = ("surface.layer", "surface.object")
 
@@ -135,6 +137,14 @@ def require_mesh_size(size: float, length: float, width: float, *, where: str, g
     instead."""
     require_number(size, above=0.0, where=where, give=give)
     length, width = float(length), float(width)  # NumPy's warn where they overflow
+    side = max(length, width)
+    if size > _COARSE * side:
+        raise InputError(
+            f"is {size / side:.3g} times as large as a surface of {length:.3g} × {width:.3g} m",
+            where=where,
+            value=size,
+            remedy=f"Give {give}.{if_other_unit(size, LENGTHS, side / 500.0, side / 10.0)}",
+        )
     expected = _TRIANGLES * (length / size) * (width / size)
     if expected > MOST_TRIANGLES:
         possible = math.sqrt(_TRIANGLES * length * width / MOST_TRIANGLES)
@@ -143,7 +153,8 @@ def require_mesh_size(size: float, length: float, width: float, *, where: str, g
             f"would give more than {MOST_TRIANGLES:,} triangles on a surface of {length:.3g} × {width:.3g} m",
             where=where,
             value=size,
-            remedy=f"Give {math.ceil(possible / rounded) * rounded:.2g} m or more, or check the surface's unit.",
+            remedy=f"Give {math.ceil(possible / rounded) * rounded:.2g} m or more, or check the surface's unit."
+            + if_other_unit(size, LENGTHS, side / 500.0, side / 10.0),
         )
     return expected
 
