@@ -162,7 +162,9 @@ def case_file() -> str:
     parts = [
         "# The case file\n\nA TOML file says what is to be designed; written from the schema that checks it. SI units. A "
         "run folder's `case.toml` has every entry, defaults included. On the command line any entry can be set: "
-        "`--set net.spacing=0.06`. Entries that aren't known are refused, with the nearest known name.\n"
+        "`--set net.spacing=0.06`. Entries that aren't known are refused, with the nearest known name; sizes that can't be, as 50 for 0.05 m of "
+        "concrete or 40 for a modulus of 40e9 Pa, with the number to write. Beside the spacing and the surface other lengths "
+        "are refused so, and what is only unusual is told.\n"
     ]
     for name, field in schema["properties"].items():
         if name == "title":

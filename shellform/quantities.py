@@ -173,7 +173,7 @@ STOCK_LENGTH: Final = Quantity(
     "every length in which rods are sold is",
     "m",
     "metres as they are sold, such as 6.0",
-    (0.05, 500.0),
+    (0.05, 1000.0),
     (0.3, 50.0),
     LENGTHS,
 )
@@ -181,7 +181,7 @@ KERF: Final = Quantity(
     "every saw's cut is",
     "m",
     "a saw cut's width in metres, such as 0.003",
-    (1e-5, 0.05),
+    (1e-5, 0.1),
     (5e-4, 0.01),
     LENGTHS,
 )

@@ -19,6 +19,7 @@ from pydantic import (
 )
 
 import shellform
+from shellform.case.beside_spacing import refuse_load, refuse_others, refuse_rods
 from shellform.case.build_rod import given_section
 from shellform.case.edge_entries import EdgesEntry
 from shellform.case.entries import (
@@ -90,11 +91,11 @@ class Case(Entry):
 
     @model_validator(mode="after")
     def _fitting(self) -> Case:
-        if self.joint.gap >= 0.5 * self.net.spacing:
-            raise ValueError(
-                f"joint.gap ({self.joint.gap:g} m) must be well below net.spacing "
-                f"({self.net.spacing:g} m); twice the rod's radius is usual"
-            )
+        if isinstance(self.rod, OwnRodEntry):
+            refuse_rods(self.rod, self.net)
+        if isinstance(self.load, LoadEntry):
+            refuse_load(self.load, self.net)
+        refuse_others(self.net, self.joint, self.cable, self.tolerances, self.optimise)
         return self
 
     @model_validator(mode="after")
@@ -168,7 +169,7 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
     try:
         case = Case.model_validate(_with_joint(with_present_names(data), file))
     except ValidationError as error:
-        raise refusal(error, Case, str(file)) from error
+        raise refusal(error, Case, str(file), follows={"joint": "rod"}) from error
     name = case.surface.file
     if "\0" in name or max(len(part.encode()) for part in ("", *Path(name).parts)) > _NAME:
         raise InputError(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from shellform.case.entries import Entry
+from shellform.case.sized import Density, RodSize, Strength, Young
 
 
 class EdgeBeamEntry(Entry):
@@ -20,16 +21,16 @@ class EdgeBeamEntry(Entry):
     composite: float = Field(
         0.5, ge=0.0, le=1.0, description="how far a bundle's rods act together, 1 as if glued, 0 loose"
     )
-    radius: PositiveFloat | None = Field(None, description="of one round rod or tube, m")
-    wall: PositiveFloat | None = Field(None, description="of a tube, m")
-    width: PositiveFloat | None = Field(None, description="of a lath in the surface, m")
-    height: PositiveFloat | None = Field(None, description="of a lath across the surface, m")
+    radius: RodSize | None = Field(None, description="of one round rod or tube, m")
+    wall: RodSize | None = Field(None, description="of a tube, m")
+    width: RodSize | None = Field(None, description="of a lath in the surface, m")
+    height: RodSize | None = Field(None, description="of a lath across the surface, m")
     catalogue: str | None = Field(None, description="a shipped catalogue's name, or a TOML file")
     section: str | None = Field(None, description='of the catalogue, like "42 x 3.5 mm"')
-    young: PositiveFloat | None = Field(None, description="Pa; left out: as the rods")
+    young: Young | None = Field(None, description="Pa; left out: as the rods")
     poisson: float = Field(0.3, ge=0.0, lt=0.5, description="Poisson's ratio, where young is given")
-    strength: PositiveFloat | None = Field(None, description="flexural strength, Pa; left out: as the rods")
-    density: NonNegativeFloat | None = Field(None, description="kg/m³; left out: as the rods")
+    strength: Strength | None = Field(None, description="flexural strength, Pa; left out: as the rods")
+    density: Density | None = Field(None, description="kg/m³; left out: as the rods")
 
     @model_validator(mode="after")
     def _one_shape(self) -> EdgeBeamEntry:

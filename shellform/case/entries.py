@@ -11,15 +11,30 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    NonNegativeFloat,
     PositiveFloat,
     PositiveInt,
-    ValidationInfo,
     field_validator,
     model_validator,
 )
 
-from shellform.gridshell.catalogue import LONGEST_STOCK, WIDEST_CUT
+from shellform.case.sized import (
+    Adjustment,
+    AreaMass,
+    ConcreteDensity,
+    Density,
+    Gap,
+    JointMass,
+    Kerf,
+    RodSize,
+    Shear,
+    Spacing,
+    StockLength,
+    Strength,
+    Thickness,
+    Young,
+    refuse_strain,
+)
+from shellform.gridshell.possible_rods import require_rods_material
 
 _Polygon = list[tuple[float, float]]
 
@@ -63,8 +78,8 @@ class SurfaceEntry(Entry):
 class NetEntry(Entry):
     """The Chebyshev net."""
 
-    spacing: PositiveFloat = Field(description="between rods, m")
-    spacing_v: PositiveFloat | None = Field(None, description="along the v rods; left out: as along u, m")
+    spacing: Spacing = Field(description="between rods, m")
+    spacing_v: Spacing | None = Field(None, description="along the v rods; left out: as along u, m")
     angle: float | Literal["auto"] = Field(
         0.0, description="of u rods against the x axis, degrees; auto: with least bending"
     )
@@ -101,10 +116,10 @@ class NetEntry(Entry):
 
 
 class _BoughtEntry(Entry):
-    stock_length: PositiveFloat | None = Field(
+    stock_length: StockLength | None = Field(
         None, description="in which rods are bought, m; left out: the catalogue's, or 6 m"
     )
-    kerf: float = Field(0.003, ge=0.0, description="width of a saw cut, m")
+    kerf: Kerf = Field(0.003, description="width of a saw cut, m")
     layers: Literal[1, 2] = Field(
         1, description="2: bent as two single laths one above the other, then locked by shear blocks"
     )
@@ -112,29 +127,21 @@ class _BoughtEntry(Entry):
         0.5, ge=0.0, le=1.0, description="how far two layers act together, 1 as if glued, 0 loose"
     )
 
-    @field_validator("stock_length", "kerf")
-    @classmethod
-    def _in_metres(cls, length: float | None, info: ValidationInfo) -> float | None:
-        most = WIDEST_CUT if info.field_name == "kerf" else LONGEST_STOCK
-        if length is not None and length > most:
-            raise ValueError(f"{length:g} m is too much; for {length:g} mm write {length / 1000.0:g}")
-        return length
-
 
 class OwnRodEntry(_BoughtEntry):
     """Rods of given sizes: round, tubes or laths."""
 
-    young: PositiveFloat = Field(description="Young's modulus, Pa")
+    young: Young = Field(description="Young's modulus, Pa")
     poisson: float = Field(0.3, ge=0.0, lt=0.5, description="Poisson's ratio, for the shear modulus")
-    shear: PositiveFloat | None = Field(None, description="shear modulus, Pa, in place of poisson")
-    strength: PositiveFloat = Field(description="flexural strength, Pa")
-    density: float = Field(0.0, ge=0.0, description="kg/m³, for the rods' own weight")
-    radius: PositiveFloat | None = Field(
+    shear: Shear | None = Field(None, description="shear modulus, Pa, in place of poisson")
+    strength: Strength = Field(description="flexural strength, Pa")
+    density: Density = Field(0.0, description="kg/m³, for the rods' own weight")
+    radius: RodSize | None = Field(
         None, description="of round rods and tubes, m; left out: the largest that the net allows"
     )
-    wall: PositiveFloat | None = Field(None, description="of tubes, m")
-    width: PositiveFloat | None = Field(None, description="of laths in the surface, m")
-    height: PositiveFloat | None = Field(None, description="of laths across the surface, m")
+    wall: RodSize | None = Field(None, description="of tubes, m")
+    width: RodSize | None = Field(None, description="of laths in the surface, m")
+    height: RodSize | None = Field(None, description="of laths across the surface, m")
 
     @model_validator(mode="after")
     def _one_shape(self) -> OwnRodEntry:
@@ -144,6 +151,11 @@ class OwnRodEntry(_BoughtEntry):
             raise ValueError("a lath needs both width and height; add the other, or give a radius")
         if self.width is not None and self.radius is not None:
             raise ValueError("a rod has either a radius or a width and a height; leave one out")
+        return self
+
+    @model_validator(mode="after")
+    def _a_material(self) -> OwnRodEntry:
+        require_rods_material(self.young, self.shear, self.strength, self.density, where="rod")
         return self
 
 
@@ -164,7 +176,7 @@ class JointEntry(Entry):
     axial: PositiveFloat = Field(description="EA, N")
     torsion: PositiveFloat = Field(description="GJ, N·m²")
     bending: PositiveFloat = Field(description="EI, N·m²")
-    gap: PositiveFloat = Field(description="between the rods' axes, m")
+    gap: Gap = Field(description="between the rods' axes, m")
 
 
 class CableEntry(Entry):
@@ -182,9 +194,14 @@ class CableEntry(Entry):
     without: bool = Field(
         True, description="also load the grid without cables, to compare with (paper, section 4.1)"
     )
-    adjustment: NonNegativeFloat | None = Field(
+    adjustment: Adjustment | None = Field(
         None, description="range of the turnbuckles, m; given: cables are cut to the fewest lengths"
     )
+
+    @model_validator(mode="after")
+    def _stretched(self) -> CableEntry:
+        refuse_strain(self.stiffness, self.force_max)
+        return self
 
 
 class LoadEntry(Entry):
@@ -234,15 +251,15 @@ class ConcreteEntry(_SpreadEntry):
     """Wet concrete on its true area."""
 
     kind: Literal["concrete"]
-    thickness: PositiveFloat = Field(description="across the surface, m")
-    density: PositiveFloat = Field(2500.0, description="kg/m³")
+    thickness: Thickness = Field(description="across the surface, m")
+    density: ConcreteDensity = Field(2500.0, description="kg/m³")
 
 
 class SheetEntry(_SpreadEntry):
     """A membrane or reinforcement on its true area."""
 
     kind: Literal["membrane", "reinforcement"]
-    mass: PositiveFloat = Field(description="kg/m²")
+    mass: AreaMass = Field(description="kg/m²")
 
 
 class RodsWeightEntry(Entry):
@@ -255,7 +272,7 @@ class JointsWeightEntry(Entry):
     """The joints' own weight."""
 
     kind: Literal["joints"]
-    mass: PositiveFloat = Field(description="of each, kg")
+    mass: JointMass = Field(description="of each, kg")
 
 
 class OptimiseEntry(Entry):

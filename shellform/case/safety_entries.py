@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveInt, model_validator
+from pydantic import Field, NonNegativeInt, PositiveInt, model_validator
 
 from shellform.case.entries import Entry
+from shellform.case.sized import PlaceDeviation
 from shellform.gridshell.tolerances import LARGEST_SHARE, SOURCES
 
 _Share = Annotated[float, Field(ge=0.0, le=LARGEST_SHARE)]
@@ -24,10 +25,10 @@ class TolerancesEntry(Entry):
     follows the shell's size, as run folders' case files say with its source.
     """
 
-    cable_length: NonNegativeFloat | None = _deviation("m", "cable_length")
+    cable_length: PlaceDeviation | None = _deviation("m", "cable_length")
     cable_stiffness: _Share | None = _deviation("share", "cable_stiffness")
-    supports: NonNegativeFloat | None = _deviation("m, each coordinate", "supports")
-    marks: NonNegativeFloat | None = _deviation("m, of crossings along rods", "marks")
+    supports: PlaceDeviation | None = _deviation("m, each coordinate", "supports")
+    marks: PlaceDeviation | None = _deviation("m, of crossings along rods", "marks")
     rod_stiffness: _Share | None = _deviation("share, of each rod", "rod_stiffness")
     rod_bow: _Share | None = _deviation("rise over length of each rod", "rod_bow")
     connectors: _Share | None = _deviation("share", "connectors")

@@ -5,7 +5,7 @@ it, the value, and the remedy that the schema knows.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, get_args, get_origin
@@ -17,9 +17,21 @@ from shellform.errors import InputError, if_per_cents
 _FACTOR = 100.0  # the largest upper bound of shares and factors: from there on they can only be per cents
 
 
-def refusal(error: ValidationError, root: type[BaseModel], where: str = "") -> InputError:
-    """What to say of wrong entries of what is of `root`'s kind, in the file that `where` names."""
-    found = [_in_words(each, root) for each in error.errors()]
+def refusal(
+    error: ValidationError,
+    root: type[BaseModel],
+    where: str = "",
+    *,
+    follows: Mapping[str, str] | None = None,
+) -> InputError:
+    """What to say of wrong entries of what is of `root`'s kind, in the file that `where` names. A table that
+    `follows` another, and is missing because that is wrong, isn't told."""
+    wrong = {each["loc"][0] for each in error.errors() if each["loc"]}
+    found = [
+        _in_words(each, root)
+        for each in error.errors()
+        if each["type"] != "missing" or (follows or {}).get(str(each["loc"][0])) not in wrong
+    ]
     remedies = dict.fromkeys(remedy for _, remedy in found if remedy)
     return InputError("; ".join(what for what, _ in found), where=where, remedy=" ".join(remedies))
 
@@ -52,6 +64,9 @@ def _in_words(error: Any, root: type[BaseModel]) -> tuple[str, str]:
     message = str(error["msg"]).removeprefix("Value error, ")
     message = message[:1].lower() + message[1:]
     if kind == "value_error":
+        said = error["ctx"]["error"]
+        if isinstance(said, InputError):
+            return f"{said.where or entry}: {said.what} (found {said.value!r})", said.remedy
         return f"{entry}: {message}", ""
     return f"{entry}: {message} (found {error['input']!r})", f"Give {entry}{meaning}.{_if_per_cents(error)}"
 

@@ -41,7 +41,6 @@ from shellform.structure.refusals import refusal
 
 _SHIPPED = Path(__file__).resolve().parent.parent / "catalogues"
 _EQUAL = 1e-9  # relative: stiffnesses that count as equal
-LONGEST_STOCK, WIDEST_CUT = 1000.0, 0.1  # m, of rods on a coil and of a saw: what is more is meant in mm
 
 
 class _Material(msgspec.Struct, forbid_unknown_fields=True):

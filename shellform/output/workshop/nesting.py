@@ -22,8 +22,9 @@ import binpacking
 import numpy as np
 
 from shellform.errors import InputError, require_count, require_number
-from shellform.gridshell.catalogue import LONGEST_STOCK, WIDEST_CUT
 from shellform.net.grid import Grid, GridRod
+from shellform.quantities import KERF as SAW_CUT
+from shellform.quantities import STOCK_LENGTH
 
 STOCK = 6.0  # m
 KERF = 0.003  # m
@@ -80,19 +81,10 @@ def cut(grid: Grid, *, stock: float = STOCK, kerf: float = KERF, laths: int = 1)
     where the stock is too short to splice rods from, and for lengths that can only be meant in mm.
     """
     require_number(
-        stock,
-        above=0.0,
-        most=LONGEST_STOCK,
-        where="rod.stock_length",
-        give="metres as they are sold, such as 6.0",
+        stock, above=0.0, most=STOCK_LENGTH.possible[1], where="rod.stock_length", give=STOCK_LENGTH.give
     )
     require_number(
-        kerf,
-        least=0.0,
-        below=stock,
-        most=WIDEST_CUT,
-        where="rod.kerf",
-        give="a saw cut's width in metres, such as 0.003",
+        kerf, least=0.0, below=stock, most=SAW_CUT.possible[1], where="rod.kerf", give=SAW_CUT.give
     )
     require_count(laths, where="laths", give="how many laths each rod is of, such as 2")
     pieces: list[Piece] = []
