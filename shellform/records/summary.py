@@ -17,6 +17,7 @@ from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.files import ANEW, plain, read_record, text_of
 from shellform.records.optimisation import OptimisationRecord, SectionRecord
 from shellform.records.scattering import RobustRecord
+from shellform.records.stages import STAGES
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.written import write_text
 
@@ -357,3 +358,16 @@ def _refuse_newer(path: Path, head: _Head) -> None:
             value=head.version,
             remedy="Install that version.",
         )
+
+
+def outdated(summary: Summary, stage: str) -> Summary:
+    """Without what a stage and those after it will find anew."""
+    if STAGES.index(stage) <= STAGES.index("initial"):
+        summary = replace(summary, designs={}, verdict=None)
+    if STAGES.index(stage) <= STAGES.index("optimise"):
+        summary = replace(
+            summary.without_designs(("unloaded", "optimised", "rounded", "polished")), optimisation=None
+        )
+    if STAGES.index(stage) <= STAGES.index("safety"):
+        summary = replace(summary.unexamined(), verdict=None)
+    return summary

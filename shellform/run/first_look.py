@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 import shellform
+from shellform.case.beside_surface import refuse_beside
 from shellform.case.build_net import net_record, refuse_distant, size_text, surface_of, surface_record
 from shellform.case.build_rod import rod_material
 from shellform.case.case import SurfaceEntry, load_case
@@ -85,6 +86,8 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
     )
     path = Path(entry.file)
     surface = surface_of(entry, allow_scripts=allow_scripts)
+    if case is not None:
+        refuse_beside(case, surface)
     bent = largest_curvature(surface)
     material = rod_material(case.rod) if case else None
     young, strength = (material.young, material.strength) if material else (YOUNG, STRENGTH)

@@ -20,6 +20,7 @@ from typing import TypeVar
 
 import shellform
 from shellform.arrays import Reals, Record
+from shellform.case.beside_surface import doubts, refuse_beside
 from shellform.case.build_gridshell import gridshell, rod_limits
 from shellform.case.build_net import net_of, net_record, size_text, surface_of, surface_record, with_rods
 from shellform.case.case import Case, check_script, dump_case
@@ -32,7 +33,7 @@ from shellform.net.refusal import NoNet, Stalled
 from shellform.net.saved import load_net, net_document, save_net
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.stages import SHOWING, STAGES, StagesDone, read_stages, write_stages
-from shellform.records.summary import ModelRecord, Summary, read_summary, write_summary
+from shellform.records.summary import ModelRecord, Summary, outdated, read_summary, write_summary
 from shellform.run import designs
 from shellform.run.broken_off import break_off
 from shellform.run.checkpoint import drop_checkpoint
@@ -137,6 +138,7 @@ def _run(
         report(Event("surface", f"reading {file}"))
         parts = Parts(surface=surface_of(case.surface, allow_scripts=allow_scripts))
         report(Event("surface", f"size {size_text(_there(parts.surface).size)}", Kind.NOTE))
+        refuse_beside(case, _there(parts.surface))
     with alone(folder, wait=wait):
         workspace = Workspace(case, folder, logged(folder, report), keys, until, profiler, sketch)
         return _run_alone(workspace, fresh, parts, began)
@@ -162,6 +164,9 @@ def _run_alone(workspace: Workspace, fresh: bool, parts: Parts, began: float) ->
             where=str(folder),
             remedy="Run the same command again.",
         )
+    if parts.surface is None:  # of an earlier run, whose results stay where the case can't be meant
+        parts = Parts(surface=load_surface(workspace.path("surface.npz"), workspace.case.surface.file))
+        refuse_beside(workspace.case, _there(parts.surface))
     if workspace.sketch:
         refuse_over_full(folder)
     summary = read_summary(folder) if done.keys else Summary()
@@ -178,7 +183,7 @@ def _run_alone(workspace: Workspace, fresh: bool, parts: Parts, began: float) ->
         drop_checkpoint(folder)
     first = next((stage for stage in _wanted(workspace) if not done.has(stage, keys[stage])), None)
     if first is not None:  # whoever reads the folder from now on finds what belongs to the case as it is
-        summary, done = _outdated(summary, first), done.before(first)
+        summary, done = outdated(summary, first), done.before(first)
         write_stages(folder, done)
         write_summary(folder, summary)
     drop_other(folder, sketch=workspace.sketch)
@@ -250,26 +255,14 @@ def _steps() -> dict[str, Callable[[Workspace, Parts, Summary, bool], _Ended]]:
     }
 
 
-def _outdated(summary: Summary, stage: str) -> Summary:
-    """Without what a stage and those after it will find anew."""
-    if STAGES.index(stage) <= STAGES.index("initial"):
-        summary = replace(summary, designs={}, verdict=None)
-    if STAGES.index(stage) <= STAGES.index("optimise"):
-        summary = replace(
-            summary.without_designs(("unloaded", "optimised", "rounded", "polished")), optimisation=None
-        )
-    if STAGES.index(stage) <= STAGES.index("safety"):
-        summary = replace(summary.unexamined(), verdict=None)
-    return summary
-
-
 def _surface(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
-    store, entry = workspace.path("surface.npz"), workspace.case.surface
-    if keep:
-        return _Ended(Parts(surface=load_surface(store, entry.file)), summary)
     surface = _there(parts.surface)
-    save_surface(store, surface)
-    return _Ended(parts, replace(summary, surface=surface_record(surface, entry.file)))
+    for doubt in doubts(workspace.case, surface):
+        workspace.say("surface", doubt, Kind.NOTE)
+    if keep:
+        return _Ended(parts, summary)
+    save_surface(workspace.path("surface.npz"), surface)
+    return _Ended(parts, replace(summary, surface=surface_record(surface, workspace.case.surface.file)))
 
 
 def _net(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:

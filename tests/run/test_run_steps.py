@@ -29,7 +29,7 @@ def test_what_a_stage_and_those_after_it_find_anew_is_outdated_and_nothing_befor
     given = replace(
         summary(names), designs=dict.fromkeys(names, examined), verdict=VERDICT, optimisation=optimisation()
     )
-    left, at = module._outdated(given, stage), STAGES.index(stage)
+    left, at = module.outdated(given, stage), STAGES.index(stage)
     if at <= STAGES.index("initial"):
         assert left.designs == {}
     elif stage == "optimise":

@@ -1,0 +1,141 @@
+"""What of a case can't be on its surface, and what is doubtful on it: lengths in millimetres, weights in kN.
+
+What can't be meant is refused before the net is pulled; what is only unusual is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.case.case import Case
+from shellform.case.entries import ConcreteEntry, JointsWeightEntry, LoadEntry, PointsEntry, SheetEntry
+from shellform.errors import InputError
+from shellform.gridshell.loads import CONCRETE, GRAVITY, as_concrete, refuse_bulk
+from shellform.quantities import DENSITIES, FORCES, LENGTHS, MASSES, if_other_unit
+from shellform.surface.shape.target import Surface
+
+_THICK = 0.04  # of the larger side: vaults of stone are as thick
+_LIGHT, _HEAVY = 10.0, 2e4  # N/m²: 0.4 mm and 0.8 m of concrete
+_LIKELY = (100.0, 5e3)  # N/m²: 4 mm and 0.2 m of concrete
+_DENSE = 1e4  # kg/m³
+_FAR = 10.0  # times the larger side: what lies farther away has nothing to do with the surface
+_WIDE = 30.0  # times the larger side, of an outline that then cuts nothing
+_JOINTS = 500.0  # N/m²: as much as 20 mm of concrete
+
+
+def refuse_beside(case: Case, surface: Surface) -> None:
+    """Raises InputError for lengths of the case that no entry on this surface can have."""
+    side = float(surface.size.max())
+    for name, part in case.part.items():
+        if isinstance(part, ConcreteEntry):
+            refuse_bulk(surface, part.thickness, where=f"part.{name}.thickness")
+    for where, length in _allowed(case):
+        if length is not None and length > side:
+            raise InputError(
+                f"lets the shape be farther off than the surface's larger side of {side:.4g} m",
+                where=where,
+                value=length,
+                remedy=f"Give metres, such as {side / 200.0:.1g}.{if_other_unit(length, LENGTHS, side / 1e4, side / 20.0)}",
+            )
+    for where, level in (("edges.ground", case.edges.ground), ("net.ground", case.net.ground)):
+        if level is not None:
+            _refuse_far(where, surface, np.array([[level]]), (2,))
+    for where, curve in _curves(case):
+        _refuse_far(where, surface, np.array(curve), (0, 1))
+
+
+def doubts(case: Case, surface: Surface) -> tuple[str, ...]:
+    """What may have been given in another unit, a sentence each."""
+    side, area = float(surface.size.max()), case.net.spacing * (case.net.spacing_v or case.net.spacing)
+    told = []
+    for where, entry in [("load", case.load), *((f"part.{name}", part) for name, part in case.part.items())]:
+        if isinstance(entry, LoadEntry | PointsEntry):
+            weight = entry.force / (entry.every * area)
+            if not _LIGHT <= weight <= _HEAVY:
+                meant = if_other_unit(entry.force, FORCES, *(each * entry.every * area for each in _LIKELY))
+                told.append(_doubt(f"{where}.force", f"{entry.force:g} N", as_concrete(weight), meant))
+        if isinstance(entry, ConcreteEntry):
+            if entry.thickness > _THICK * side:
+                meant = if_other_unit(entry.thickness, LENGTHS, side / 1000.0, _THICK * side)
+                much = f"a {side / entry.thickness:.0f}th of the surface's larger side"
+                told.append(_doubt(f"{where}.thickness", f"{entry.thickness:g} m", much, meant))
+            if entry.density > _DENSE:
+                meant = if_other_unit(entry.density, DENSITIES, 300.0, 6e3)
+                much = f"{entry.density / CONCRETE:.3g} times what concrete has"
+                told.append(_doubt(f"{where}.density", f"{entry.density:g} kg/m³", much, meant))
+        if isinstance(entry, SheetEntry) and entry.mass * GRAVITY > _HEAVY / 10.0:
+            meant = if_other_unit(entry.mass, MASSES, 0.1, 100.0).replace(" g ", " g/m² ")
+            much = as_concrete(entry.mass * GRAVITY)
+            told.append(_doubt(f"{where}.mass", f"{entry.mass:g} kg/m²", much, meant))
+        if isinstance(entry, JointsWeightEntry) and entry.mass * GRAVITY > _JOINTS * area:
+            meant = if_other_unit(entry.mass, MASSES, 0.0, 0.1 * _JOINTS * area / GRAVITY)
+            much = as_concrete(entry.mass * GRAVITY / area)
+            told.append(_doubt(f"{where}.mass", f"{entry.mass:g} kg", much, meant))
+    outline = np.ptp(np.array(case.net.outline or [(0.0, 0.0)]), axis=0).max()
+    if outline > _WIDE * side:
+        much = f"{outline / side:.0f} times as wide as the surface, so that it cuts nothing"
+        told.append(_doubt("net.outline", f"{outline:g} m wide", much, ""))
+    strained = case.cable.stiffness * (1.0 / case.cable.rest_ratio - 1.0)
+    if strained > case.cable.force_max:
+        much = f"less than the {strained:.3g} N to which cable.rest_ratio strains cables of {case.cable.stiffness:g} N"
+        meant = if_other_unit(case.cable.force_max, FORCES, strained, case.cable.stiffness)
+        told.append(_doubt("cable.force_max", f"{case.cable.force_max:g} N", much, meant))
+    return tuple(told)
+
+
+def _doubt(where: str, value: str, what: str, meant: str) -> str:
+    return f"{where} is {value}: {what}. Is the unit right?{meant}"
+
+
+def _allowed(case: Case) -> Iterator[tuple[str, float | None]]:
+    """How far the shape may be off, m, by the entries."""
+    yield "limits.deviation", case.limits.deviation
+    yield "limits.built_deviation", case.limits.built_deviation
+    yield "optimise.deviation", case.optimise.deviation
+    yield "optimise.misfit_rms_additional", case.optimise.misfit_rms_additional
+    yield "robust.limit", None if case.robust is None else case.robust.limit
+    yield "figures.limit", case.figures.limit
+
+
+def _curves(case: Case) -> Iterator[tuple[str, Sequence[tuple[float, float]]]]:
+    """The curves in plan, by the entries."""
+    if case.net.outline:
+        yield "net.outline", case.net.outline
+    for k, guide in enumerate(case.net.guides or []):
+        yield f"net.guides[{k}]", guide
+    for k, stretch in enumerate(case.edges.stretch):
+        if stretch.curve is not None:
+            yield f"edges.stretch[{k}].curve", stretch.curve
+    entries = [("load", case.load), *((f"part.{name}", part) for name, part in case.part.items())]
+    for where, entry in entries:
+        for name in ("openings", "inside"):
+            for k, polygon in enumerate(getattr(entry, name, ())):
+                if polygon:
+                    yield f"{where}.{name}[{k}]", polygon
+
+
+def _refuse_far(where: str, surface: Surface, points: Reals, axes: Sequence[int]) -> None:
+    """Raises InputError for points (k, a), m, along some of the `axes`, whose box lies farther from the
+    surface's than that is large."""
+    low, high = (end[list(axes)] for end in (surface.vertices.min(axis=0), surface.vertices.max(axis=0)))
+    reach = _FAR * float(surface.size.max())
+
+    def far(given: Reals) -> bool:
+        return bool(((given.min(axis=0) > high + reach) | (given.max(axis=0) < low - reach)).any())
+
+    if not far(points):
+        return
+    units = [f" For millimetres write {_short(1e-3 * points)}."] if not far(1e-3 * points) else []
+    raise InputError(
+        f"lies away from the surface, which reaches from {_short(low)} to {_short(high)} m there",
+        where=where,
+        value=points[0].tolist() if len(points) > 1 else float(points[0, 0]),
+        remedy=f"Give metres.{''.join(units)}",
+    )
+
+
+def _short(numbers: Reals) -> str:
+    return ", ".join(f"{each:.4g}" for each in numbers.ravel()[:4]) + (" …" if numbers.size > 4 else "")
