@@ -17,6 +17,7 @@ from shellform.structure.solve.assembly import Assembly
 _APART = 1e12  # ratio of stiffnesses of which double precision leaves four digits
 _MISFIT = 2.0  # ratio of a beam's rest length to the distance of its nodes
 _STRAIGHT = 1e-9  # off the axis, over the rod's length
+_WIDE, _SLENDER = 150.0, 1e4  # m; length over radius of gyration: in metres elements of wire keep below it
 _LOOSE = 1e-12  # of the firmest, an eigenvalue of what holds a part, below which it doesn't
 
 
@@ -97,9 +98,15 @@ def connected(count: int, ends: Indices) -> tuple[int, Indices]:
 
 def doubts(network: Network) -> list[str]:
     """What is allowed but rarely meant, a sentence each: nodes in one place, stiffnesses too far apart, rest
-    lengths far from the distance of their nodes, straight rods that nothing keeps from spinning about
-    their own axis (that spin is held in the solution)."""
-    return [*_coincident(network), *_far_apart(network), *_misfitting(network), *_free_to_spin(network)]
+    lengths far from the distance of their nodes, nodes in millimetres, straight rods that nothing keeps from
+    spinning about their own axis (that spin is held in the solution)."""
+    return [
+        *_coincident(network),
+        *_far_apart(network),
+        *_misfitting(network),
+        *_in_millimetres(network),
+        *_free_to_spin(network),
+    ]
 
 
 def lost_moments(network: Network, load: Reals) -> list[str]:
@@ -122,6 +129,22 @@ def _coincident(network: Network) -> list[str]:
     return [
         f"{how_many(int(same.sum()), 'node lies', 'nodes lie')} where another one does, nodes[{pair[0]}] and "
         f"nodes[{pair[1]}] the first; they don't touch."
+    ]
+
+
+def _in_millimetres(network: Network) -> list[str]:
+    beams, side = network.beams, float(np.ptp(network.nodes, axis=0).max())
+    softer = np.minimum(beams.bending_y, beams.bending_z)
+    bent = (softer > 0.0) & (beams.axial > 0.0)
+    if side < _WIDE or not bent.any():
+        return []
+    thick = np.sqrt(softer[bent] / beams.axial[bent])  # radius of gyration, m, where EA and EI are right
+    slender = float(np.median(beams.rest_length[bent] / thick))
+    if slender < _SLENDER:
+        return []
+    return [
+        f"The nodes reach over {side:.4g} m, and beams are {slender:.2g} times as long as EA and EI make them thick: if "
+        f"millimetres were meant, write metres, {1e-3 * side:.4g} in place of {side:.4g}."
     ]
 
 

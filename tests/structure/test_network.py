@@ -205,3 +205,18 @@ def test_a_straight_rod_between_hinges_spins_but_does_not_swing_and_one_on_a_hin
     for held, swings in (({0: HINGE, 3: HINGE}, []), ({1: HINGE}, [0])):
         fixed = np.array([held.get(k, PART) for k in range(4)])
         assert swinging(replace(network(points, rods), fixed=fixed)).tolist() == swings
+
+
+def test_nodes_in_millimetres_are_told_beside_stiffness_in_newtons_and_metres():
+    """Rods of 1 mm in radius over half a metre, and over five hundred; a hall in metres isn't doubted."""
+    rods, stiffness = [[0, 1], [1, 2]], [125.7e3, 0.024, 0.031, 0.031]
+    small, large = (
+        network([[0, 0, 0], [0.25 * times, 0, 0], [0.5 * times, 0.1, 0]], rods, stiffness=stiffness)
+        for times in (1.0, 1000.0)
+    )
+    assert not any("millimetres" in each for each in doubts(small))
+    (told,) = [each for each in doubts(large) if "millimetres" in each]
+    assert "over 500 m" in told
+    assert "write metres, 0.5 in place of 500" in told
+    hall = network([[0, 0, 0], [1, 0, 0], [200, 0, 0]], rods, stiffness=[1e9, 1e6, 2e6, 2e6])
+    assert not any("millimetres" in each for each in doubts(hall))
