@@ -40,7 +40,8 @@ def new(
         typer.Option(
             "--way-out",
             help="Where no design stands on the surface as it is, go on with the nearest that can be built, walls all round, "
-            "or a first layer of concrete, whichever is found first; the case says so.",
+            "or a first layer of concrete, whichever is found first; with walls too where it strays too far as built, and less "
+            "on them. The case says so.",
         ),
     ] = False,
     allow_scripts: Scripts = False,

@@ -6,7 +6,7 @@ where it falls, two layers where the stiffest that equation (1) allows falls, fi
 concrete last. What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods,
 solved again, and forty structures are drawn and loaded (first_trial.py). Edge beams are bundles of rods, or
 stiffer steel tubes where these are stressed too much or the shell nearly stands (first_edges.py). What stands
-gets heavier edge beams, stiffer rods and thicker strands at last, where they help (first_finish.py).
+gets heavier edge beams, stiffer rods and thicker strands where they help (first_finish, first_steadier).
 
 Nothing is random but what is drawn under a fixed seed: the same surface gives the same case.
 """
@@ -26,6 +26,7 @@ from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_edges import HEAVY, EdgeChoice, edge_choices
 from shellform.run.first_finish import came_to, nearer, straighter, too_far, with_room
 from shellform.run.first_net import ANGLES, Allowance, bends_to, least_bent_net, with_gap
+from shellform.run.first_steadier import steadier, strays, with_strays
 from shellform.run.first_trial import (
     DRAWN,
     NEEDED,
@@ -41,6 +42,7 @@ from shellform.run.next_trial import (
     bears_most,
     edges_may_help,
     fails_by,
+    more_come,
     narrowed,
     relieved,
     stiffer_rods,
@@ -115,7 +117,11 @@ def finished_design(
     if too_far(found, surface):
         found = nearer(found, surface, search.stiffer, search.other, allowance, search.say)
         found = replace(found, told=tuple(search.told))
-    return with_room(found, surface, search.say)
+    found = with_strays(with_room(found, surface, search.say), surface)
+    if strays(found, surface):
+        found = steadier(found, surface, search.stiffer, search.other, allowance, search.say)
+        found = replace(found, told=tuple(search.told))
+    return found
 
 
 class _Search:
@@ -245,7 +251,7 @@ class _Search:
             at = after(placed.net, possible, tried)
         else:
             tried, at = {}, first_choice(placed.net, self.surface, spacing, possible, needed)
-        narrows = not _more_come(possible[-1], self.layers)
+        narrows = not more_come(possible[-1], self.layers)
         while at not in tried:
             ended = len(tried) >= (_NARROWED if narrows and narrowed(possible, tried) else _STEPS)
             if tried and (ended or self.allowance.over):
@@ -306,7 +312,7 @@ class _Search:
         """The design with these rods and this load, and the lightest edge beams with which it stands. Single
         rods of which drawn structures fall give way to two layers, which cost no more and spare more than
         heavier edge beams."""
-        spare = _more_come(choice, self.layers)
+        spare = more_come(choice, self.layers)
         for edge in edge_choices(choice)[self.lightest : self.lightest + HEAVY]:
             result = self.with_edges(placed, choice, edge, spacing, thickness)
             if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result)):
@@ -390,8 +396,3 @@ class _Search:
         if self.best is None or failure.near(NEEDED) >= self.best.near(NEEDED):
             self.best = failure
         return failure
-
-
-def _more_come(choice: RodChoice, layers: Sequence[int]) -> bool:
-    """Whether rods in more of the `layers` are tried after this choice's."""
-    return layers_of(choice.section) < layers[-1]

@@ -6,6 +6,8 @@ rounded surface, where its rods are bent too much (way_out.py), on walls where i
 much concrete as these bear, where no rounded surface helps, or it falls of its load alone. None is begun once
 the work is done that a surface is worth. Each ends with the first design that stands; who goes that way has
 it finished.
+
+Of a shell that stands and strays too far as built walls are tried too, where edge beams carry its edge.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.net.edges import stretches_of
 from shellform.run.first_design import standing_design
 from shellform.run.first_net import Allowance
+from shellform.run.first_steadier import strays, with_strays
 from shellform.run.first_trial import FirstDesign
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish
@@ -94,6 +97,18 @@ def with_ways_out(
         way_out = _poured_first(refusal, surface, wish, say, whole.part(_TRIED))
         refusal = refusal if way_out is not None else refusal.in_vain()
     return Refused(refusal, way_out)
+
+
+def steadier_on_walls(surface: Surface, wish: DesignWish, say: Say, allowance: Allowance) -> WayOut | None:
+    """Walls all round, for a shell whose structures stray too far as built; None where its outer edge stands
+    on the ground, or they do on walls too. `allowance`: of all that the surface is worth."""
+    if not _on_edge_beams(surface, wish) or allowance.over:
+        return None
+    found = _on_walls(surface, wish, say, allowance.part(_WALLED))
+    if found is None:
+        return None
+    steady = replace(found, design=with_strays(found.design, surface))
+    return None if strays(steady.design, surface) else steady
 
 
 def _to_nearest(

@@ -2,7 +2,8 @@
 
 Two elements a segment are enough for that: they change critical factors by half a percent. Structures are
 drawn with errors of building a quarter larger than they are to be expected: few of them then refuse what else
-more would be needed for (requirements.py).
+more would be needed for (requirements.py). How far a shell is off as built is that of the structures, with
+usual errors, which `design` draws of its initial design.
 """
 
 from __future__ import annotations
@@ -35,6 +36,10 @@ ELEMENTS = 2  # a segment
 NEEDED = 1.5  # times the design load, which the perfect structure bears: drawn ones fall earlier
 ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path the design load then is
 DRAWN, SEED, ENLARGED = 40, 1, 1.25  # structures, their seed, and how much larger their errors are
+LOOKED_AT, JUDGED = (
+    20,
+    0,
+)  # structures of which the shape is looked at, and the seed under which a case has them
 STRESSED = 0.95  # of the strength, at the most, under the additional load
 PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond it takes no cables away
 _RELIEVED = 1.5  # with which power of the force in excess a section has to grow: stiffer strands bear more of the load
@@ -135,7 +140,7 @@ class FirstDesign:
     """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; the `parts`; `thickness`, m, of
     the concrete; what the perfect structure came to (`tried`); of `drawn` structures `standing`; the largest
     fibre distance, m, that equation (1) allows rods of that material (`allowed`); what was `told` on the
-    way."""
+    way; how far, m, structures as built stray (`strays`; None: not looked at)."""
 
     spacing: float
     reason: str
@@ -147,6 +152,7 @@ class FirstDesign:
     drawn: int
     allowed: float
     told: tuple[str, ...]
+    strays: float | None = None
 
 
 def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> Followed:
@@ -202,6 +208,15 @@ def drawn_standing(net: Net, surface: Surface, parts: FirstParts, thickness: flo
         if not all(each.stands for each in made):
             break
     return standing
+
+
+def straying(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> float:
+    """How far any node of structures as built that stand lies from where that of the perfect one does, under
+    the design load, m."""
+    shell, load = _shell(net, surface, parts, thickness)
+    nominal = perfect(shell, shell.design(rest_ratio=parts.rest_ratio), load)
+    made = Workshop(nominal).load_numbers(default_tolerances(shell), seed=JUDGED, numbers=range(LOOKED_AT))
+    return max((each.far for each in made if each.stands), default=0.0)
 
 
 def _shell(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> tuple[Gridshell, Reals]:

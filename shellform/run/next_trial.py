@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
+from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.run.first_trial import NEEDED, PULLED, STRESSED, FirstParts, Followed
 from shellform.run.sizes import (
@@ -97,6 +98,11 @@ def after(net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]
         return thinner
     between = _between(possible, tried)
     return between[len(between) // 2] if between else at
+
+
+def more_come(choice: RodChoice, layers: Sequence[int]) -> bool:
+    """Whether rods in more of the `layers` are tried after this choice's."""
+    return layers_of(choice.section) < layers[-1]
 
 
 def narrowed(possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]) -> bool:

@@ -17,18 +17,17 @@ from shellform.case.build_net import FAR, counted_from, distant_origin, size_tex
 from shellform.errors import InputError, NotConverged, how_many, printable
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.edge_beams import Bundle
-from shellform.gridshell.joints import PAPER_SPACING
 from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import Edges, stretches_of
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
-from shellform.records.remedies import rounded_up
 from shellform.run.first_design import finished_design, first_design
 from shellform.run.first_edges import TUBES
 from shellform.run.first_finish import far_told
 from shellform.run.first_look import surface_entry
 from shellform.run.first_net import Allowance, larger
-from shellform.run.first_refusal import WayOut, with_ways_out
+from shellform.run.first_refusal import WayOut, steadier_on_walls, with_ways_out
+from shellform.run.first_steadier import strays, strays_told
 from shellform.run.first_trial import (
     ADDITIONAL,
     ELEMENTS,
@@ -38,13 +37,13 @@ from shellform.run.first_trial import (
     FirstParts,
 )
 from shellform.run.plinths import plinths_for
-from shellform.run.sizes import OF_SPAN, THICKNESS, DesignWish, RodChoice, may_come_off, usual_thickness
+from shellform.run.proposed_shape import built_deviation, optimise_table, stray_told
+from shellform.run.sizes import THICKNESS, DesignWish, RodChoice, usual_thickness
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
-_EVALUATIONS, _POLISHED = 30, 10  # that the case proposed asks for: a first answer in minutes
 _SEARCH = 2 / 3  # of the work that a surface is worth: the search for a design of it as it is
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
@@ -95,8 +94,14 @@ def propose_case(
         taken = refused.way_out
         if taken is None or not way_out:
             raise refused.offered from error
-        return {"way out": taken.told, **_gone_on(asked, ready, refused.error, taken)}
-    return _written(asked, file, ready, design, wish, ready.told)
+        return {"way out": taken.told, **_gone_on(asked, ready, refused.error.what, taken)}
+    steady = None
+    if strays(design, ready.surface):
+        steady = steadier_on_walls(ready.surface, wish, asked.say, worth)
+    if steady is not None and way_out:
+        why = strays_told(design, ready.surface)
+        return {"way out": steady.told, **_gone_on(asked, ready, why, steady)}
+    return _written(asked, file, ready, design, wish, ready.told, steady)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,15 +136,13 @@ def _read(asked: _Asked, file: Path, options: Mapping[str, Any]) -> _Ready:
     return _Ready(surface, options, told, "" if plinths is None else plinths.told)
 
 
-def _gone_on(
-    asked: _Asked, ready: _Ready, refusal: InputError | NotConverged, taken: WayOut
-) -> dict[str, str]:
-    """The case of the way out, whose design is finished. The head says so, and what was told of the surface
-    as it is: coordinates in a file that is offered are those of that one, whose feet may have been cut
-    off."""
-    asked.say(f"not as it is: {refusal.what}. {taken.told}")
+def _gone_on(asked: _Asked, ready: _Ready, why: str, taken: WayOut) -> dict[str, str]:
+    """The case of the way out, whose design is finished. The head says so, `why`, and what was told of the
+    surface as it is: coordinates in a file that is offered are those of that one, whose feet may have been
+    cut off."""
+    asked.say(f"not as it is: {why}. {taken.told}")
     told: tuple[str, ...] = (
-        f"NOT the surface as it is: {refusal.what}",
+        f"NOT the surface as it is: {why}",
         f"but the way out. {taken.told}",
         *ready.told,
     )
@@ -159,16 +162,18 @@ def _written(
     design: FirstDesign,
     wish: DesignWish,
     told: tuple[str, ...],
+    steady: WayOut | None = None,
 ) -> dict[str, str]:
     """The case for the surface in `file`, written, with what was `told` before at its head, and what it
-    proposes."""
+    proposes; `steady`: on which its structures wouldn't stray too far as built, where they do."""
     surface = ready.surface
     edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)))
     entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **ready.options}
     design = replace(design, told=(*told, *design.told))
     title = asked.file.stem + ("" if file == asked.file else ", nearest buildable surface")
-    far = far_told(design, surface)
-    write_text(asked.output, _text(asked.file, title, entries, surface, design, wish, edges))
+    stray = stray_told(design, surface, steady)
+    far = "; ".join(each for each in (far_told(design, surface), stray) if each)
+    write_text(asked.output, _text(asked.file, title, entries, surface, design, wish, edges, stray))
     return {
         "size": size_text(surface.size),
         **({"plinths": ready.plinths} if ready.plinths else {}),
@@ -194,6 +199,7 @@ def _text(
     design: FirstDesign,
     wish: DesignWish,
     edges: str,
+    stray: str,
 ) -> str:
     """The case file."""
     lines = "\n".join(f"{name} = {json.dumps(value, ensure_ascii=False)}" for name, value in entries.items())
@@ -252,30 +258,13 @@ factors = {{ concrete = {ADDITIONAL!r}, rods = {ADDITIONAL!r} }}   # the design 
 
 [limits]
 utilisation = 1.0    # of the rods' strength, under any load
+{built_deviation(surface, design, stray)}
 
-{_optimise(surface, design)}
+{optimise_table(surface, design)}
 # [title_block]      # on the drawings, where it is filled in
 # date = ""
 # revision = ""
 # author = ""
-"""
-
-
-def _optimise(surface: Surface, design: FirstDesign) -> str:
-    """The table of the search."""
-    off = may_come_off(surface, design.thickness)
-    why = f"a {OF_SPAN:g}th of the span" if off > 0.5 * design.thickness else "half the concrete's thickness"
-    far = far_told(design, surface)
-    return f"""\
-[optimise]
-misfit = 0.7         # w1
-cable_force = 0.3    # w2
-# built_misfit = 0.3 # of the shape as built, with 0.35 for the others: keeps cables that hold structures as built in shape
-misfit_rms_additional = {_short(0.005 * design.spacing / PAPER_SPACING)!r}     # m, constraint (6): the paper's 5 mm × {design.spacing / PAPER_SPACING:.3g}
-deviation = {rounded_up(off)!r}    # m, {why}: beyond it no cable is taken away for shape; limits.deviation requires it{far and f"; {far}"}
-evaluations = {_EVALUATIONS}     # a first answer in minutes; 100 leave fewer cables
-polish = {_POLISHED}
-unloaded = false     # true: make the design without regard to the loads too, to compare with
 """
 
 

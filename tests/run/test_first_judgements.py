@@ -304,8 +304,17 @@ def test_edge_beams_are_tried_from_the_lightest_of_their_stage_on(
     assert asked == tried
 
 
-@pytest.mark.parametrize(("far", "finished"), [(True, ["nearer", "with room"]), (False, ["with room"])])
-def test_what_lies_far_off_is_stiffened_before_its_strands(monkeypatch, far, finished):
+@pytest.mark.parametrize(
+    ("far", "stray", "finished"),
+    [
+        (True, False, ["nearer", "with room"]),
+        (False, False, ["with room"]),
+        (False, True, ["with room", "steadier"]),
+    ],
+)
+def test_what_lies_far_off_is_stiffened_before_its_strands_and_what_strays_after_them(
+    monkeypatch, far, stray, finished
+):
     done = []
     found = first_trial.FirstDesign(0.5, "why", None, None, 0.05, None, 40, 40, 0.03, ("before",))
 
@@ -314,13 +323,21 @@ def test_what_lies_far_off_is_stiffened_before_its_strands(monkeypatch, far, fin
         say("what was tried since")
         return design
 
+    def steadier(design, surface, stiffer, other, allowance, say):
+        done.append("steadier")
+        say("what was tried since")
+        return design
+
     monkeypatch.setattr(first_design, "straighter", lambda design, *_: design)
+    monkeypatch.setattr(first_design, "with_strays", lambda design, surface: design)
+    monkeypatch.setattr(first_design, "strays", lambda *_: stray)
+    monkeypatch.setattr(first_design, "steadier", steadier)
     monkeypatch.setattr(first_design, "too_far", lambda *_: far)
     monkeypatch.setattr(first_design, "nearer", nearer)
     monkeypatch.setattr(first_design, "with_room", lambda design, *_: done.append("with room") or design)
     told = first_design.finished_design(found, None, DesignWish(), lambda text: None, Allowance()).told
     assert done == finished
-    assert told == (("before", "what was tried since") if far else ("before",))
+    assert told == (("before", "what was tried since") if far or stray else ("before",))
 
 
 @pytest.mark.parametrize(

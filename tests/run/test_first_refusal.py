@@ -91,6 +91,31 @@ def test_walls_are_offered_with_their_height_where_a_design_stands_on_them(monke
 
 
 @pytest.mark.parametrize(
+    ("carried", "stands", "strays", "work", "found"),
+    [
+        (True, True, 0.11, 1000, True),
+        (True, True, 0.29, 1000, False),  # there too
+        (True, False, 0.0, 1000, False),
+        (False, True, 0.11, 1000, False),  # its edge stands on the ground
+        (True, True, 0.11, 0, False),
+    ],
+)
+def test_walls_are_offered_to_what_strays_as_built_where_it_strays_less_on_them(
+    monkeypatch, carried, stands, strays, work, found
+):
+    design = SimpleNamespace(strays=strays, thickness=0.05)
+    offer = first_refusal.WayOut(STANDS, DesignWish(edges="wall"), "With walls")
+    monkeypatch.setattr(first_refusal, "_on_edge_beams", lambda surface, wish: carried)
+    monkeypatch.setattr(first_refusal, "_on_walls", lambda *_: offer if stands else None)
+    monkeypatch.setattr(first_refusal, "with_strays", lambda design_, surface: design)
+    monkeypatch.setattr(first_refusal, "strays", lambda design_, surface: design_.strays > 0.28)
+    steady = first_refusal.steadier_on_walls(None, DesignWish(), print, first_refusal.Allowance(work))
+    assert (steady is not None) is found
+    if steady is not None:
+        assert (steady.design, steady.wish.edges) == (design, "wall")
+
+
+@pytest.mark.parametrize(
     ("stands", "asked", "work", "tried"),
     [
         (True, None, 1000, [0.009]),

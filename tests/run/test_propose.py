@@ -27,7 +27,8 @@ from shellform.run.first_edges import edge_choices
 from shellform.run.first_net import Allowance
 from shellform.run.first_refusal import Refused, WayOut
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts, Followed
-from shellform.run.propose import _edge_beams, _edge_beams_told, _optimise, propose_case
+from shellform.run.propose import _edge_beams, _edge_beams_told, propose_case
+from shellform.run.proposed_shape import built_deviation, optimise_table, stray_told
 from shellform.run.sizes import (
     LEAST_PRESTRAIN,
     STRAINED,
@@ -130,15 +131,67 @@ def test_a_proposed_case_saves_cables_up_to_half_its_concrete_or_a_500th_of_its_
         Followed(NEEDED, 0.5, 0.3, 0.0, 0.0, 0.5, np.zeros(3), np.zeros(3)),
     )
     design = SimpleNamespace(thickness=thickness, spacing=0.5, tried=tried)
-    entry = _optimise(surface, design)
+    entry = optimise_table(surface, design)
     assert tomllib.loads(entry)["optimise"]["deviation"] == deviation
     assert why in entry
     assert "initial design" not in entry
     design.tried = replace(tried, off=4.6 * deviation)
-    far = _optimise(surface, design)
+    far = optimise_table(surface, design)
     assert tomllib.loads(far) == tomllib.loads(entry)
     assert "the initial design lies" in far
     assert "4.6 times what its shape may be in the end, of which a search usually leaves a quarter" in far
+
+
+@pytest.mark.parametrize(
+    ("size", "thickness", "most", "why"),
+    [(14.0, 0.05, 0.28, "a 50th of the span"), (0.4, 0.016, 0.016, "the concrete's thickness")],
+)
+def test_a_proposed_case_limits_the_shape_as_built_to_a_50th_of_its_span_or_its_concrete(
+    size, thickness, most, why
+):
+    surface = dish(size=size, rise=0.2 * size)
+    design = SimpleNamespace(thickness=thickness, strays=most)
+    assert stray_told(design, surface, None) == ""
+    entry = built_deviation(surface, design, "")
+    assert tomllib.loads(entry) == {"built_deviation": most}
+    assert entry.endswith(why)
+    design.strays = 1.5 * most
+    walls = WayOut(SimpleNamespace(strays=0.5 * most), DesignWish(edges="wall"), "With walls")
+    told = stray_told(design, surface, walls)
+    assert f"stray by up to {1.5e3 * most:g} mm, where {1e3 * most:g} mm may be" in told
+    assert told.endswith(f"with --edges wall by up to {500 * most:g} mm")
+    assert tomllib.loads(built_deviation(surface, design, told)) == {"built_deviation": most}
+
+
+@pytest.mark.parametrize("taken", [True, False])
+def test_a_shell_that_strays_as_built_is_told_so_and_stands_on_walls_where_the_way_out_is_taken(
+    tmp_path, monkeypatch, taken
+):
+    file, case, wish = as_obj(tmp_path / "a.obj", dish(size=6.0, count=13)), tmp_path / "a.toml", []
+    asked = DesignWish(spacing=0.6, angle=0.0, layers=1)
+    design = standing_design(read_surface(file), asked, print, Allowance())
+    monkeypatch.setattr(propose, "first_design", lambda *_: replace(design, strays=0.2))
+    steady = WayOut(
+        replace(design, strays=0.05), replace(asked, edges="wall"), "With --edges wall this goes on"
+    )
+    monkeypatch.setattr(propose, "steadier_on_walls", lambda *_: steady)
+    monkeypatch.setattr(propose, "finished_design", lambda design, *_: wish.append("finished") or design)
+    told = propose_case(file, case, {}, allow_scripts=False, wish=asked, way_out=taken)
+    text = case.read_text(encoding="utf-8")
+    assert load_case(case).limits.built_deviation == 0.12
+    assert load_case(case).edges.outer == ("wall" if taken else "auto")
+    assert wish == (["finished"] if taken else [])
+    if taken:
+        assert told["way out"] == steady.told
+        assert "NOT the surface as it is: structures drawn as built stray by up to 200 mm" in text
+        assert "shape" not in told
+    else:
+        said = "structures drawn as built stray by up to 200 mm, where 120 mm may be; with --edges wall by up to 50 mm"
+        assert told["shape"] == said
+        assert (
+            f"built_deviation = 0.12    # m, under the design load, in the worst of twenty structures as built: a 50th of the span; {said}\n"
+            in text
+        )
 
 
 def test_what_the_shape_of_a_proposed_case_may_be_off_by_is_no_requirement_before_it_is_made_one(proposed):

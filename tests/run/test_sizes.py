@@ -134,6 +134,13 @@ def test_a_shape_may_be_off_by_a_500th_of_its_span_or_half_its_concrete(monkeypa
     assert sizes.whole_mm(0.0129) == 0.012
 
 
+def test_a_structure_as_built_may_be_off_by_a_50th_of_its_span_or_its_concrete(monkeypatch):
+    monkeypatch.setattr(sizes, "width", lambda _: 15.0)
+    assert sizes.may_stray(surface(), 0.05) == pytest.approx(0.3)
+    monkeypatch.setattr(sizes, "width", lambda _: 0.4)
+    assert sizes.may_stray(surface(), 0.016) == pytest.approx(0.016)
+
+
 @pytest.mark.parametrize(
     ("off", "ratio"), [(0.0028284, 0.998), (0.004, 0.9972), (1e-4, 0.999), (0.1, 0.996), (0.0, 0.999)]
 )
