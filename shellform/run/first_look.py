@@ -34,7 +34,7 @@ from shellform.records.summary import Summary, SurfaceRecord, write_summary
 from shellform.run.figures import pictures_possible
 from shellform.run.folder import alone, refuse_overwriting
 from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
-from shellform.surface.readers.reading import FORMATS, kind_of
+from shellform.surface.readers.reading import FORMATS, kind_of, states_unit
 from shellform.surface.readers.stated import stated_unit
 from shellform.surface.shape.target import Surface, largest_curvature
 from shellform.written import write_text
@@ -180,7 +180,7 @@ def _unit(path: Path, stated: str | None) -> str:
     if path.suffix == ".py":
         return "m"
     kind = kind_of(path)
-    if kind in ("step", "iges", "3dm"):
+    if states_unit(path):
         found = stated_unit(path, kind) if kind != "3dm" else None
         return "the file's own" if found is None else f"{found}, as the file states"
     return stated or "m, as none is stated (--unit)"

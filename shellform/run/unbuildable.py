@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_trial import NEEDED, STRESSED
 from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_usual, least_spacing, radius_for
 from shellform.run.way_out import COVERED
+from shellform.surface.readers.reading import states_unit
 from shellform.surface.shape.target import Surface, sharpest_bend
 from shellform.surface.units import METRES
 
@@ -167,13 +169,16 @@ def refuse_size(surface: Surface) -> None:
     likely = (2.0, 0.5 * LARGEST)
     taken = [unit for unit in _SUSPECTED if likely[0] <= side * METRES[unit] <= likely[1]]
     stated = [unit for unit in _SUSPECTED if likely[0] <= side / METRES[unit] <= likely[1]]
+    own = states_unit(Path(surface.source))  # which --unit doesn't change
     remedy = "Scale the file to the size that is meant."
-    if taken:
+    if taken and not own:
         remedy = f"Give the file's unit: --unit {taken[0]} makes it {side * METRES[taken[0]]:.3g} m."
-    elif stated:
+    elif taken or stated:
+        said, meant = ("m", taken[0]) if taken else (stated[0], "m")
+        how = "in the program that wrote the file, and export it anew" if own else f"by --unit {meant}"
         remedy = (
-            f"If {stated[0]} was stated and metres were meant, state metres, in the program that wrote the file or by --unit m: "
-            f"that makes it {side / METRES[stated[0]]:.3g} m. Else scale it to the size that is meant."
+            f"If {said} was stated and {meant} was meant, state {meant} {how}: that makes it "
+            f"{side * METRES[meant] / METRES[said]:.3g} m. Else scale it to the size that is meant."
         )
     raise InputError(
         f"is {x:.4g} × {y:.4g} × {z:.4g} m, which no gridshell is ({SMALLEST:g} to {LARGEST:g} m)",

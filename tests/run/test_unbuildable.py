@@ -55,7 +55,7 @@ def placed(out):
 
 
 def of_size(*size):
-    return SimpleNamespace(size=np.array(size))
+    return SimpleNamespace(size=np.array(size), source="a mesh")
 
 
 @pytest.mark.parametrize("size", [(0.2, 0.1, 9.0), (0.1, 0.2, 0.0), (150.0, 1.0, 400.0), (3.0, 149.0, 1.0)])
@@ -95,8 +95,24 @@ def test_of_a_shell_that_is_far_too_small_metres_are_suspected_that_were_stated_
 ):
     with pytest.raises(InputError, match="which no gridshell is") as told:
         refuse_size(of_size(side, side, 0.3 * side))
-    assert told.value.remedy.startswith(f"If {unit} was stated and metres were meant, state metres")
+    assert told.value.remedy.startswith(f"If {unit} was stated and m was meant, state m by --unit m")
     assert f"makes it {metres} m" in told.value.remedy
+
+
+@pytest.mark.parametrize(("side", "said", "meant", "metres"), [(0.02, "mm", "m", 20), (2e4, "m", "mm", 20)])
+def test_of_files_that_state_their_own_unit_no_option_is_named_which_they_would_refuse(
+    tmp_path, side, said, meant, metres
+):
+    file = tmp_path / "a.step"
+    file.write_text("ISO-10303-21;")
+    surface = SimpleNamespace(size=np.array([side, side, 0.3 * side]), source=str(file))
+    with pytest.raises(InputError, match="which no gridshell is") as told:
+        refuse_size(surface)
+    assert told.value.remedy.startswith(
+        f"If {said} was stated and {meant} was meant, state {meant} in the program that wrote the file"
+    )
+    assert f"makes it {metres} m" in told.value.remedy
+    assert "--unit" not in told.value.remedy
 
 
 @pytest.mark.parametrize("axes", [(0, 1, 2), (2, 0, 1), (1, 2, 0)])

@@ -36,6 +36,7 @@ FORMATS = {
 }  # fmt: skip
 _HEAD = 65536  # bytes, by which a file's format is told
 _UPRIGHT = 0.25  # plan over area, below which a shell is likely to lie on its side
+_STATED_UNIT = ("step", "iges", "3dm")
 _STATED_UP = ("gltf",)  # formats that say which axis is vertical
 _TURNED = "its {} axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"
 # that are taken for the vertical, in this order, where a shell would lie on its side; z is looked at first
@@ -233,6 +234,11 @@ def kind_of(file: Path) -> str:
             remedy=f"Rename it to {file.stem}{ending}, or export it anew.",
         )
     return stated or found or ""
+
+
+def states_unit(file: Path) -> bool:
+    """Whether a file is of a format that states its own unit, so that none may be given."""
+    return file.is_file() and kind_of(file) in _STATED_UNIT
 
 
 def _content(head: bytes, file: Path) -> str | None:
