@@ -2,12 +2,14 @@
 name.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from shellform.errors import InputError
 from shellform.surface.readers import mend
-from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 from shellform.surface.readers.reading import surface_of
 from shellform.surface.readers.seams import open_edges
 from tests.surface.shells import cap, split
@@ -285,6 +287,23 @@ def test_of_edges_of_three_faces_the_first_is_told_with_its_place():
     with pytest.raises(InputError) as told:
         mended(fins, faces)
     assert f"2 edges belong to more than two faces, the first at {place} m" in str(told.value)
+
+
+@pytest.mark.parametrize("branching", [True, False])
+def test_of_several_objects_that_make_no_skin_together_it_is_told_how_one_is_chosen(branching):
+    fin, away = np.array([POINTS[60], POINTS[61], [0.0, 0.0, 5.0]]), np.add(POINTS, [20.0, 0.0, 0.0])
+    other = (fin, np.array([[0, 1, 2]])) if branching else (away, TRIANGLES)
+    parts = [MeshObject("roof", "A", POINTS, (TRIANGLES,)), MeshObject("", "site", other[0], (other[1],))]
+    with pytest.raises(InputError) as told:
+        mend.mended(joined(parts, Choice(), "s"), "s")
+    chosen = (
+        "by surface.object or surface.layer (--object, --layer), among 'roof' on layer 'A', layer 'site'; or "
+    )
+    assert chosen in told.value.remedy
+    alike = [replace(part, name="roof", layer="A") for part in parts]
+    with pytest.raises(InputError) as told:
+        mend.mended(joined(alike, Choice(), "s"), "s")
+    assert "--object" not in told.value.remedy
 
 
 def test_pieces_are_told_with_their_areas_sizes_and_middles_the_largest_first():

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -80,7 +81,7 @@ def read_compas(file: Path, choice: Choice) -> Draft:
                 "faces without load were left out as openings",
             )
         )
-    return Draft(draft.points, draft.triangles, notes=tuple(notes))
+    return replace(draft, notes=tuple(notes))
 
 
 def _tables(data: Any, name: str, points: str, joins: str) -> Iterator[tuple[str, dict[str, Any]]]:

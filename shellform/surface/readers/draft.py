@@ -28,7 +28,8 @@ _ENTRIES = ("surface.layer", "surface.object")
 class Draft(Record):
     """`points` (v, 3) in units of `metres` m (None: the file doesn't say) with the vertical axis `up`;
     `triangles` (t, 3); unit `normals` (v, 3) where the source knows them, zero where it knows others;
-    `notes`, a sentence for each thing left out or chosen."""
+    `notes`, a sentence for each thing left out or chosen; `objects`, what the file's objects that it is made
+    of are called, "" where one of them has no name."""
 
     points: Reals
     triangles: Indices
@@ -36,6 +37,7 @@ class Draft(Record):
     metres: float | None = None
     up: str = "z"
     notes: tuple[str, ...] = ()
+    objects: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +92,22 @@ def _is_called(name: str, wanted: str) -> bool:
     return wanted.casefold() in (name.casefold(), name.rsplit("::", 1)[-1].casefold())
 
 
+def called(layer: str, name: str) -> str:
+    """What an object is told by: its name, and its layer; "" where it has neither."""
+    return " on ".join([*([repr(name)] if name else []), *([f"layer {layer!r}"] if layer else [])])
+
+
+def choosable(draft: Draft) -> str:
+    """How one of the file's objects is chosen, and what they are called; "" where there is one, or where
+    names and layers don't tell them apart."""
+    known = list(dict.fromkeys(each for each in draft.objects if each))
+    if len(known) < 2:
+        return ""
+    more = f" and {len(known) - _NAMES_TOLD} more" if len(known) > _NAMES_TOLD else ""
+    listed = ", ".join(known[:_NAMES_TOLD])
+    return f"by surface.object or surface.layer (--object, --layer), among {listed}{more}"
+
+
 def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:
     """All chosen parts as one mesh of triangles. Raises InputError where there is no face."""
     if not any(len(block) for part in parts for block in part.faces):
@@ -128,7 +146,11 @@ def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:
             where=where,
             remedy="Export a coarser mesh.",
         )
-    return Draft(np.vstack(points), faces)
+    return Draft(
+        np.vstack(points),
+        faces,
+        objects=tuple(called(p.layer, p.name) for p in kept if any(map(len, p.faces))),
+    )
 
 
 def require_mesh_size(size: float, length: float, width: float, *, where: str, give: str) -> float:

@@ -90,6 +90,7 @@ def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest:
             answer["metres"],
             answer["up"],
             tuple(answer["notes"]),
+            tuple(answer["objects"]),
         )
 
 
@@ -113,7 +114,12 @@ def _serve() -> None:
     arrays: dict[str, Any] = {}
     try:
         draft = _read(file, request["kind"], request["settings"])
-        answer: dict[str, Any] = {"metres": draft.metres, "up": draft.up, "notes": list(draft.notes)}
+        answer: dict[str, Any] = {
+            "metres": draft.metres,
+            "up": draft.up,
+            "notes": list(draft.notes),
+            "objects": list(draft.objects),
+        }
         arrays = {"points": draft.points, "triangles": draft.triangles}
         if draft.normals is not None:
             arrays["normals"] = draft.normals

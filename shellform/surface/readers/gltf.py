@@ -12,7 +12,7 @@ import base64
 import json
 import struct
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -71,8 +71,7 @@ def read_gltf(file: Path, choice: Choice) -> Draft:
         raise InputError(
             f"can't be read as glTF: {said}", where=str(file), remedy="Export it anew, uncompressed."
         ) from error
-    draft = joined(parts, Choice(), str(file))
-    return Draft(draft.points, draft.triangles, up="y")
+    return replace(joined(parts, Choice(), str(file)), up="y")
 
 
 def _opened(file: Path) -> tuple[dict[str, Any], bytes]:

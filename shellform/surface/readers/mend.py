@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many
-from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.draft import Draft, choosable
 from shellform.surface.readers.seams import sewn, without_slivers
 from shellform.surface.readers.sides import shared_edges, side_of
 
@@ -164,11 +164,14 @@ def _refuse_branches(draft: Draft, where: str) -> None:
     pairs, counts = np.unique(edges, axis=0, return_counts=True)
     if (counts > 2).any():
         place = draft.points[pairs[np.argmax(counts > 2), 0]]
+        others = choosable(draft)
         raise InputError(
             f"{how_many(int((counts > 2).sum()), 'edge belongs', 'edges belong')} to more than two faces, the first at "
             f"{place.round(4).tolist()} m",
             where=where,
-            remedy="Remove the faces inside or behind the surface and export it again.",
+            remedy=f"Choose {others}; or remove the faces inside or behind the surface and export it again."
+            if others
+            else "Remove the faces inside or behind the surface and export it again.",
         )
 
 
@@ -198,15 +201,16 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
     )
     order = np.argsort(-area, kind="stable")
     if piece is None:
+        others = choosable(draft)
         listed = ", ".join(f"{area[k]:.3g}" for k in order[:_PIECES_TOLD]) + (
             " …" if count > _PIECES_TOLD else ""
         )
         raise InputError(
             f"has {count} separate pieces, of {listed} m²",
             where=where,
-            remedy=f"Choose one (surface.piece): {_choices(draft, label, order[:_PIECES_TOLD])}; or by "
-            f"object or "
-            "layer; or join their edges.",
+            remedy=f"Choose one (surface.piece): {_choices(draft, label, order[:_PIECES_TOLD])}; "
+            + (f"or {others}; " if others else "")
+            + "or join their edges.",
         )
     kept = replace(draft, triangles=draft.triangles[label == order[piece - 1]])
     return noted(

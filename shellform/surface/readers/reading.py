@@ -8,6 +8,7 @@ content disagree the file is refused; where the ending is unknown, the content d
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -291,4 +292,4 @@ def _upright(draft: Draft, unit: str | None, vertical: str) -> Draft:
     factor = unit_factor(unit or "m") if draft.metres is None else draft.metres
     normals = None if draft.normals is None else turned_up(draft.normals, vertical)
     points = factor * turned_up(draft.points, vertical)
-    return Draft(points, draft.triangles, normals, 1.0, "z", draft.notes)
+    return replace(draft, points=points, normals=normals, metres=1.0, up="z")

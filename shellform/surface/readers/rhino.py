@@ -24,7 +24,7 @@ from scipy.interpolate import make_interp_spline
 
 from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, MeshObject, among, joined
+from shellform.surface.readers.draft import Choice, Draft, MeshObject, among, called, joined
 from shellform.surface.readers.nurbs import Curve, Patch
 from shellform.surface.readers.rhino_bytes import without_date_and_path
 
@@ -155,7 +155,8 @@ def read_rhino(
         return replace(joined(parts, Choice(), str(file)), metres=1.0, up=up)
     from shellform.surface import cad
 
-    return cad.mesh_patches(patches, size=size, up=up, face=face, where=file, before_mesh=before_mesh)
+    draft = cad.mesh_patches(patches, size=size, up=up, face=face, where=file, before_mesh=before_mesh)
+    return replace(draft, objects=tuple(called(layer, name) for layer, name, _ in chosen))
 
 
 def _numbered(found: list[tuple[str, str, Any]]) -> list[tuple[str, str, Any]]:
@@ -287,7 +288,10 @@ def _patch(surface: Any, loops: Sequence[tuple[Curve, ...]], factor: float) -> P
         [[(p.X, p.Y, p.Z, p.W) for p in (nurbs.Points[i, j] for j in range(columns))] for i in range(rows)]
     )
     degree = (nurbs.OrderU - 1, nurbs.OrderV - 1)
-    knots = _full([k for k in nurbs.KnotsU], degree[0]), _full([k for k in nurbs.KnotsV], degree[1])
+    knots = (
+        _full([k for k in nurbs.KnotsU], degree[0]),
+        _full([k for k in nurbs.KnotsV], degree[1]),
+    )
     return Patch(factor * points[..., :3] / points[..., 3:], points[..., 3], knots, degree, tuple(loops))
 
 
