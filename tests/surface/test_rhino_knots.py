@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shellform.surface.readers.rhino import _full
+from shellform.surface.readers.nurbs import with_end_knots
 
 
 @pytest.mark.parametrize(
@@ -19,4 +19,4 @@ from shellform.surface.readers.rhino import _full
     ],
 )
 def test_rhino_s_knot_vector_gets_back_its_first_and_last_knot(inner, degree, whole):
-    np.testing.assert_array_equal(_full(inner, degree), whole)
+    np.testing.assert_array_equal(with_end_knots(inner, degree), whole)

@@ -28,6 +28,12 @@ _SHELL, _FORCES = "ThrustDiagram", "ForceDiagram"
 _LOADED = ("_is_loaded", "is_loaded")  # of a face, as later and earlier versions call it
 
 
+def holds_meshes(file: Path) -> bool:
+    """Whether a file of COMPAS holds a mesh, or a network."""
+    data = json.loads(file.read_bytes())
+    return any(True for joins in (("vertex", "face"), ("node", "edge")) for _ in _tables(data, "", *joins))
+
+
 def read_compas(file: Path, choice: Choice) -> Draft:
     """The mesh in a COMPAS file, or the one of its meshes that `choice` names. Raises InputError for what
     can't be used.
@@ -42,7 +48,7 @@ def read_compas(file: Path, choice: Choice) -> Draft:
         raise InputError(
             "holds no COMPAS mesh",
             where=str(file),
-            remedy="Save a compas.datastructures.Mesh, or a RHINOVault session.",
+            remedy="Save a compas.datastructures.Mesh, a NURBS surface, or a RHINOVault session; a Brep as STEP.",
         )
     kind, read = ("network", partial(_between_lines, str(file))) if networks else ("mesh", _part)
     found = found or networks

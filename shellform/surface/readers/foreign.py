@@ -38,6 +38,7 @@ _ANEW = "Open it in the program that wrote it, check it, and export it anew or i
 _LIBRARIES = {
     "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "plyfile", "msh": "meshio",
     "vtk": "VTK", "vtu": "VTK", "vtp": "VTK", "gltf": "the glTF reader", "script": "the builder script",
+    "compas surface": "gmsh",
 }  # fmt: skip
 
 
@@ -151,6 +152,18 @@ def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
 
         return cad.read_script(file, size=settings["size"], dimensions=settings["dimensions"])
     choice = Choice(settings["layer"], settings["name"])
+    if kind == "compas surface":
+        from shellform.surface.readers import compas_surfaces
+
+        return compas_surfaces.read_compas_surfaces(
+            file,
+            choice,
+            unit=settings["unit"],
+            size=settings["size"],
+            up=settings["up"],
+            face=settings["face"],
+            before_mesh=allow_mesh,
+        )
     if _LIBRARIES[kind] == "gmsh":
         from shellform.surface import cad
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from shellform.arrays import Reals, Record
 
@@ -28,3 +31,16 @@ class Patch(Record):
     knots: tuple[Reals, Reals]
     degree: tuple[int, int]
     loops: tuple[tuple[Curve, ...], ...] = ()
+
+
+def with_end_knots(knots: Sequence[float] | Reals, degree: int) -> Reals:
+    """The knot vector (n + degree - 1,) with its first and last knot, which no curve depends on and Rhino
+    leaves out."""
+    inner = np.array(knots, dtype=float)
+    first = inner[0] if np.all(inner[:degree] == inner[0]) else inner[0] - (inner[degree] - inner[degree - 1])
+    last = (
+        inner[-1]
+        if np.all(inner[-degree:] == inner[-1])
+        else inner[-1] + (inner[-degree] - inner[-degree - 1])
+    )
+    return np.concatenate([[first], inner, [last]])

@@ -15,7 +15,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, require_file, unreadable
-from shellform.surface.readers import compas, foreign, plain
+from shellform.surface.readers import compas, compas_surfaces, foreign, plain
 from shellform.surface.readers.draft import MOST_BYTES, Choice, Draft
 from shellform.surface.readers.fills import filled
 from shellform.surface.readers.mend import mended, noted
@@ -95,6 +95,8 @@ def read_surface(
     """
     file = Path(path)
     kind = kind_of(file)
+    if kind == "compas" and compas_surfaces.holds_surfaces(file) and not compas.holds_meshes(file):
+        kind = "compas surface"
     if unit is not None:
         unit_factor(unit)
     turned_up(np.zeros((0, 3)), up or "z")  # refuses an unknown axis before the work

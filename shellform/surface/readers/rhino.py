@@ -25,7 +25,7 @@ from scipy.interpolate import make_interp_spline
 from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError
 from shellform.surface.readers.draft import Choice, Draft, MeshObject, among, called, joined
-from shellform.surface.readers.nurbs import Curve, Patch
+from shellform.surface.readers.nurbs import Curve, Patch, with_end_knots
 from shellform.surface.readers.rhino_bytes import without_date_and_path
 
 _METRES = {
@@ -276,7 +276,7 @@ def _curve(edge: Any, factor: float) -> Curve:
     return Curve(
         factor * points[:, :3] / points[:, 3:],
         points[:, 3],
-        _full([k for k in nurbs.Knots], nurbs.Degree),
+        with_end_knots([k for k in nurbs.Knots], nurbs.Degree),
         nurbs.Degree,
     )
 
@@ -289,22 +289,10 @@ def _patch(surface: Any, loops: Sequence[tuple[Curve, ...]], factor: float) -> P
     )
     degree = (nurbs.OrderU - 1, nurbs.OrderV - 1)
     knots = (
-        _full([k for k in nurbs.KnotsU], degree[0]),
-        _full([k for k in nurbs.KnotsV], degree[1]),
+        with_end_knots([k for k in nurbs.KnotsU], degree[0]),
+        with_end_knots([k for k in nurbs.KnotsV], degree[1]),
     )
     return Patch(factor * points[..., :3] / points[..., 3:], points[..., 3], knots, degree, tuple(loops))
-
-
-def _full(knots: Sequence[float], degree: int) -> Reals:
-    """The knot vector with its first and last knot, which the curve doesn't depend on."""
-    inner = np.array(knots, dtype=float)
-    first = inner[0] if np.all(inner[:degree] == inner[0]) else inner[0] - (inner[degree] - inner[degree - 1])
-    last = (
-        inner[-1]
-        if np.all(inner[-degree:] == inner[-1])
-        else inner[-1] + (inner[-degree] - inner[-degree - 1])
-    )
-    return np.concatenate([[first], inner, [last]])
 
 
 def _along_edge(surface: Any, edges: Sequence[Any]) -> bool:
