@@ -61,8 +61,10 @@ def every_format(folder):
         mesh.save(folder / name)
         files.append(folder / name)
     mesh.cast_to_unstructured_grid().save(folder / "a.vtu")
+    x, y = np.meshgrid(np.linspace(0.0, 8.0, 9), np.linspace(0.0, 6.0, 7), indexing="ij")
+    pyvista.StructuredGrid(x, y, 0.1 * x * (8.0 - x)).save(folder / "a.vts")
     copies = [DATA / name for name in ("dome_mm.step", "dome_mm.igs", "dome_mm.brep", "tna_tutorial.3dm")]
-    return [*files, folder / "a.json", folder / "a.vtu", *copies]
+    return [*files, folder / "a.json", folder / "a.vtu", folder / "a.vts", *copies]
 
 
 def test_files_cut_off_in_the_middle_are_refused_in_every_format(tmp_path):

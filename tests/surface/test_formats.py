@@ -81,6 +81,16 @@ def test_vtk_s_own_files_come_back(tmp_path, name, binary):
     same_shell(read_surface(tmp_path / name))
 
 
+@pytest.mark.parametrize("binary", [True, False])
+def test_a_structured_grid_is_read_as_it_is_saved(tmp_path, binary):
+    x, y = np.meshgrid(np.linspace(0.0, 8.0, 9), np.linspace(0.0, 6.0, 7), indexing="ij")
+    grid = pyvista.StructuredGrid(x, y, 0.1 * x * (8.0 - x))
+    grid.save(tmp_path / "a.vts", binary=binary)
+    surface = read_surface(tmp_path / "a.vts")
+    np.testing.assert_allclose(surface.size, [8.0, 6.0, 1.6])
+    assert (len(surface.triangles), surface.mended) == (2 * 8 * 6, ())
+
+
 def test_a_strip_of_triangles_in_a_vtp_file_is_read(tmp_path):
     polydata().triangulate().strip().save(tmp_path / "a.vtp")
     same_shell(read_surface(tmp_path / "a.vtp"))

@@ -37,7 +37,7 @@ _ONE_THREAD = {
 _ANEW = "Open it in the program that wrote it, check it, and export it anew or in another format."
 _LIBRARIES = {
     "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "plyfile", "msh": "meshio",
-    "vtk": "VTK", "vtu": "VTK", "vtp": "VTK", "gltf": "the glTF reader", "script": "the builder script",
+    "vtk": "VTK", "vtu": "VTK", "vtp": "VTK", "vts": "VTK", "gltf": "the glTF reader", "script": "the builder script",
     "compas surface": "gmsh",
 }  # fmt: skip
 

@@ -26,13 +26,13 @@ ENDINGS = {
     ".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep",
     ".3dm": "3dm",
     ".stl": "stl", ".obj": "obj", ".ply": "ply", ".off": "off", ".gltf": "gltf", ".glb": "gltf",
-    ".vtk": "vtk", ".vtu": "vtu",
+    ".vtk": "vtk", ".vtu": "vtu", ".vts": "vts",
     ".vtp": "vtp", ".msh": "msh", ".json": "compas",
 }  # fmt: skip
 FORMATS = {
     "step": "STEP", "iges": "IGES", "brep": "OpenCASCADE BREP", "3dm": "Rhino 3DM", "stl": "STL",
     "obj": "OBJ", "ply": "PLY",
-    "off": "OFF", "gltf": "glTF", "vtk": "VTK", "vtu": "VTU", "vtp": "VTP", "msh": "MSH",
+    "off": "OFF", "gltf": "glTF", "vtk": "VTK", "vtu": "VTU", "vtp": "VTP", "vts": "VTS", "msh": "MSH",
     "compas": "COMPAS JSON",
 }  # fmt: skip
 _HEAD = 65536  # bytes, by which a file's format is told
@@ -265,7 +265,11 @@ def _content(head: bytes, file: Path) -> str | None:
     if re.match(rb"(ST|C|N|4|n)*OFF\s", text):
         return "off"
     if b"<VTKFile" in text[:1024]:
-        xml = {b'type="PolyData"': "vtp", b'type="UnstructuredGrid"': "vtu"}
+        xml = {
+            b'type="PolyData"': "vtp",
+            b'type="UnstructuredGrid"': "vtu",
+            b'type="StructuredGrid"': "vts",
+        }
         return next((kind for mark, kind in xml.items() if mark in text[:2048]), None)
     if text.startswith(b"{"):
         data = file.read_bytes()

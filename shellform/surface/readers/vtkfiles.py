@@ -1,4 +1,4 @@
-"""VTK files, legacy (.vtk) and XML (.vtu, .vtp); the door to VTK's readers.
+"""VTK files, legacy (.vtk) and XML (.vtu, .vtp, .vts); the door to VTK's readers.
 
 VTK's readers say what they stumble over to an error channel and go on: the first sentence there becomes the
 message.
@@ -20,7 +20,9 @@ _STRIP = 6  # VTK_TRIANGLE_STRIP
 
 
 def read_vtk(file: Path, choice: Choice, kind: str) -> Draft:
-    """The polygons of a file of `kind` "vtk", "vtu" or "vtp". Raises InputError for what can't be used."""
+    """The polygons of a file of `kind` "vtk", "vtu", "vtp" or "vts". Raises InputError for what can't be
+    used.
+    """
     reader = _reader(kind)
     said: list[str] = []
     reader.AddObserver("ErrorEvent", lambda source, event: said.append(event))
@@ -65,12 +67,17 @@ def read_vtk(file: Path, choice: Choice, kind: str) -> Draft:
 def _reader(kind: str) -> Any:
     try:
         from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
-        from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
+        from vtkmodules.vtkIOXML import (
+            vtkXMLPolyDataReader,
+            vtkXMLStructuredGridReader,
+            vtkXMLUnstructuredGridReader,
+        )
     except ImportError as error:
         raise not_installed(f"a surface as {kind.upper()}", "cad-exchange", error) from error
     readers = {
         "vtk": vtkGenericDataObjectReader,
         "vtp": vtkXMLPolyDataReader,
         "vtu": vtkXMLUnstructuredGridReader,
+        "vts": vtkXMLStructuredGridReader,
     }
     return readers[kind]()
