@@ -182,7 +182,7 @@ def _unit(path: Path, stated: str | None) -> str:
     kind = kind_of(path)
     if states_unit(path):
         found = stated_unit(path, kind) if kind != "3dm" else None
-        return "the file's own" if found is None else f"{found}, as the file states"
+        return (stated or "the file's own") if found is None else f"{found}, as the file states"
     return stated or "m, as none is stated (--unit)"
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+import rhino3dm
 
 from shellform.errors import InputError
 from shellform.run.first_look import check_file
@@ -103,6 +104,24 @@ def test_words_of_an_iges_file_s_other_sections_are_no_numbers(tmp_path):
 
 def test_check_names_the_unit_that_a_file_carries():
     assert check_file(DATA / "dome_mm.step", {}, allow_scripts=False).unit == "mm, as the file states"
+
+
+def test_check_says_the_unit_that_was_given_for_a_rhino_file_without_one(tmp_path):
+    model, mesh = rhino3dm.File3dm(), rhino3dm.Mesh()
+    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, "None")
+    for point in [(0, 0, 0), (9000, 0, 0), (9000, 6000, 0), (0, 6000, 800)]:
+        mesh.Vertices.Add(*point)
+    mesh.Faces.AddFace(0, 1, 2, 3)
+    model.Objects.AddMesh(mesh)
+    model.Write(str(tmp_path / "a.3dm"), 7)
+    with pytest.raises(InputError, match=r"no usable unit.*--unit"):
+        check_file(tmp_path / "a.3dm", {}, allow_scripts=False)
+    found = check_file(tmp_path / "a.3dm", {"unit": "mm"}, allow_scripts=False)
+    assert (found.unit, found.surface.size[0]) == ("mm", 9.0)
+    assert (
+        check_file(DATA / "tna_tutorial.3dm", {"object": "mesh 1"}, allow_scripts=False).unit
+        == "the file's own"
+    )
 
 
 def test_a_section_s_words_end_with_its_semicolon_and_strings_where_they_say():
