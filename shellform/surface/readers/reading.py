@@ -42,6 +42,14 @@ _STATED_UP = ("gltf",)  # formats that say which axis is vertical
 _TURNED = "its {} axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"
 # that are taken for the vertical, in this order, where a shell would lie on its side; z is looked at first
 _OTHER_AXES = ("y", "x")
+_ROUND, _TOOTHED = (
+    24,
+    np.deg2rad(35.0),
+)  # an edge's vertices at least; what half of them turn by, if not smooth
+_RAGGED = (
+    "its edge is toothed, turning by {:.0f}° or more at half of its vertices: rods end along a smooth line, so "
+    "trim it to one"
+)
 _LEVEL = 0.01  # of the rise: points as high as others
 _COARSE = 1e-4  # of the extent, that coordinates lie apart: rounding bends what is flat
 _STEPS = (
@@ -163,18 +171,31 @@ def _closed(whole: Draft, vertical: str, source: str, fill: str | None, ground: 
 
 
 def _doubts(surface: Surface, vertical: str) -> tuple[str, ...]:
-    """What tells that another axis of a surface's file is the vertical one, with that axis."""
+    """What tells that a surface's edge is no line that rods can end along, or that another axis of its file
+    is the vertical one, with that axis."""
+    ragged = _ragged(surface)
     plan = _plan_share(surface.vertices, surface.triangles)
     if plan >= _UPRIGHT:
-        return (_HANGS.format(downwards(vertical)),) if _hangs(surface.vertices, surface) else ()
+        return (*ragged, _HANGS.format(downwards(vertical))) if _hangs(surface.vertices, surface) else ragged
     told = _UPRIGHT_AS_READ.format(100.0 * plan)
     as_in_file = turned_back(surface.vertices, vertical)
     for axis in ("z", *_OTHER_AXES):
         points = turned_up(as_in_file, axis)
         if _plan_share(points, surface.triangles) >= _UPRIGHT:
             found = downwards(axis) if _hangs(points, surface) else axis
-            return (f"{told}: give its {found} axis for the vertical (surface.up, --up {found})",)
-    return (f"{told}, and so it does with any other of its axes for the vertical",)
+            return (*ragged, f"{told}: give its {found} axis for the vertical (surface.up, --up {found})")
+    return (*ragged, f"{told}, and so it does with any other of its axes for the vertical")
+
+
+def _ragged(surface: Surface) -> tuple[str, ...]:
+    """What tells that an edge is toothed, as a scan's is, or one that was cut out by whole faces."""
+    for edge in surface.boundary:
+        steps = np.diff(surface.vertices[np.append(edge, edge[:1])], axis=0)
+        steps /= np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-300)
+        turn = np.arccos(np.clip(np.sum(steps * np.roll(steps, -1, axis=0), axis=1), -1.0, 1.0))
+        if len(edge) >= _ROUND and np.median(turn) > _TOOTHED:
+            return (_RAGGED.format(np.rad2deg(np.median(turn))),)
+    return ()
 
 
 def _step_of_32_bits(draft: Draft) -> float:
