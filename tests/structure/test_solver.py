@@ -343,3 +343,23 @@ def test_what_rounding_hides_is_refused_and_the_elements_are_named():
     with pytest.raises(NotConverged, match=r"Rounding hides the load.*beams\[7\].*softer") as caught:
         find_equilibrium(assemble(stiff), turned, 1e-6 * load)
     assert caught.value.state is not None
+
+
+@pytest.mark.parametrize("backend", factorisation.installed())
+def test_the_factor_at_hand_serves_for_the_same_values_until_others_were_factorised(backend, monkeypatch):
+    monkeypatch.setenv("SHELLFORM_SOLVER", backend)
+    matrix, values = family(random_matrix(20.0))
+    right = np.arange(30.0)
+    factor = matrix.factor(values)
+    assert matrix.factor(values.copy()) is factor
+    np.testing.assert_allclose(random_matrix(20.0) @ factor.solve(right), right, atol=1e-9)
+    twice = matrix.factor(2.0 * values)
+    assert twice is not factor
+    again = matrix.factor(values)
+    assert again is not factor
+    np.testing.assert_allclose(random_matrix(20.0) @ again.solve(right), right, atol=1e-9)
+    matrix.factor_indefinite(values)
+    np.testing.assert_allclose(random_matrix(20.0) @ matrix.factor(values).solve(right), right, atol=1e-9)
+    with pytest.raises(factorisation.NotPositiveDefinite):
+        matrix.factor(-values)
+    np.testing.assert_allclose(random_matrix(20.0) @ matrix.factor(values).solve(right), right, atol=1e-9)
