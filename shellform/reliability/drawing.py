@@ -116,17 +116,16 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
     stiffness[members.connectors] = np.exp(
         t.connectors * z["connectors"] + t.connectors_all * z["connectors_all"]
     )
-    first = 0
-    for k, rod in enumerate(members.rods):
-        own = t.marks * z["marks"][first : first + len(rod.marks)]
-        first += len(rod.marks)
-        nominal = members.beam_length[rod.elements]
-        longer = np.diff(own) / np.add.reduceat(nominal, rod.marks[:-1])
-        length[rod.elements] = np.repeat(np.maximum(longer, _LEAST - 1.0), np.diff(rod.marks)) * nominal
-        stiffness[rod.elements] = stiffness[rod.locks] = np.exp(t.rod_stiffness * z["rod_stiffness"][k])
-        bow = 8.0 * t.rod_bow / float(nominal.sum()) * z["rod_bow"][2 * k : 2 * k + 2]
-        # An element that runs against the rod has its local y axis turned round and goes the other way.
-        curvature[rod.elements] = np.column_stack([np.full(len(nominal), bow[0]), rod.sense * bow[1]])
+    made = members.rod_elements
+    off = np.diff(t.marks * z["marks"][made.marks], axis=1)[:, 0]
+    longer = np.maximum(off / made.segment_length, _LEAST - 1.0)
+    length[made.elements] = longer[made.segment] * members.beam_length[made.elements]
+    stiff = np.exp(t.rod_stiffness * z["rod_stiffness"])
+    stiffness[made.elements], stiffness[made.locks] = stiff[made.rod], stiff[made.locked]
+    bow = (8.0 * t.rod_bow / made.rod_length)[:, None] * z["rod_bow"].reshape(-1, 2)
+    # An element that runs against the rod has its local y axis turned round and goes the other way.
+    curvature[made.elements] = bow[made.rod]
+    curvature[made.elements, 1] *= made.sense
     return Errors(
         cable_length=t.cable_length * z["cable_length"],
         cable_stiffness=np.exp(

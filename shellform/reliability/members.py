@@ -38,6 +38,27 @@ class Member(Record):
 
 
 @dataclass(frozen=True, eq=False)
+class RodElements(Record):
+    """The elements of all rods, one rod after the other.
+
+    - `elements` (e,) among the beams, with the `rod` of each and its `sense` along it; `locks` (l,) among the
+      beams, with the rod of each, `locked`.
+    - `segment` (e,): that of each element between two marks; `marks` (s, 2): those at both ends of each
+      segment among all rods' marks; `segment_length` (s,), m; `rod_length` (r,), m.
+    """
+
+    elements: Indices
+    rod: Indices
+    sense: Reals
+    locks: Indices
+    locked: Indices
+    segment: Indices
+    marks: Indices
+    segment_length: Reals
+    rod_length: Reals
+
+
+@dataclass(frozen=True, eq=False)
 class Members(Record):
     """What errors are drawn for.
 
@@ -60,6 +81,29 @@ class Members(Record):
     def span(self) -> float:
         """The longest side, m, of the box round the target."""
         return float(np.ptp(self.places, axis=0).max())
+
+    @cached_property
+    def rod_elements(self) -> RodElements:
+        """The rods' elements, of which thousands of structures are drawn."""
+        rods, none = self.rods, np.zeros(0, dtype=np.int64)
+        elements = np.concatenate([none, *(rod.elements for rod in rods)])
+        locks = np.concatenate([none, *(rod.locks for rod in rods)])
+        counts = np.concatenate([none, *(np.diff(rod.marks) for rod in rods)])  # of elements in segments
+        nominal = self.beam_length[elements]
+        number = np.arange(len(rods))
+        first = np.arange(len(counts)) + np.repeat(number, [len(rod.marks) - 1 for rod in rods])
+        begins = np.cumsum(counts) - counts
+        return RodElements(
+            elements=elements,
+            rod=np.repeat(number, [len(rod.elements) for rod in rods]),
+            sense=np.concatenate([np.zeros(0), *(rod.sense for rod in rods)]),
+            locks=locks,
+            locked=np.repeat(number, [len(rod.locks) for rod in rods]),
+            segment=np.repeat(np.arange(len(counts)), counts),
+            marks=np.stack([first, first + 1], axis=1),
+            segment_length=np.add.reduceat(nominal, begins) if len(counts) else np.zeros(0),
+            rod_length=np.array([self.beam_length[rod.elements].sum() for rod in rods]),
+        )
 
 
 def members_of(shell: Gridshell) -> Members:
