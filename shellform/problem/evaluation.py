@@ -36,9 +36,9 @@ from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import cores, side_by_side
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
-from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.loading import Loaded, apply_load
+from shellform.structure.solve.whole_steps import next_equilibrium
 
 _TRIAL = 12  # factorisations for one trial equilibrium; from a near design five are enough
 _LED = 0.5  # of a further load, the steps by which it is led
@@ -307,7 +307,7 @@ class Evaluator:
     def _settled(self, assembly: Assembly, start: State, load: Reals) -> _Tried:
         """The stable equilibrium next to the state `start` under the `load`."""
         try:
-            found = find_equilibrium(assembly, start, load, limit=_TRIAL, on_branch=True)
+            found = next_equilibrium(assembly, start, load, limit=_TRIAL)
         except NotConverged as error:
             return _Tried(None, error.iterations, str(error))
         misfit = float(((found.state.positions - self.shell.target.positions) ** 2).sum())

@@ -29,7 +29,6 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import NotConverged
-from shellform.reliability.branch import ON_THE_WAY, Here
 from shellform.reliability.path_of_one import Loading
 from shellform.structure.answers.sensitivity import by_rest_length, by_stiffness
 from shellform.structure.answers.stability import modes
@@ -37,6 +36,7 @@ from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.parts import Part
 from shellform.structure.elements.state import State
+from shellform.structure.solve.whole_steps import ON_THE_WAY, Here
 
 _RESOLUTION = 1 / 64  # of the load, to which the end of the branch is known before it is sought exactly
 _NARROW = 1e-3  # of the load, between whose ends one cable at most is taken to go slack

@@ -13,7 +13,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
-from shellform.reliability.branch import ON_THE_WAY, STRAY, Branch, Foreseen, Here
+from shellform.reliability.branch import STRAY, Branch
 from shellform.reliability.drawing import (
     Errors,
     built_beams,
@@ -27,6 +27,7 @@ from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite, Symmetric
+from shellform.structure.solve.whole_steps import ON_THE_WAY, Foreseen, Here
 
 LIMIT_POINT, BIFURCATION, BORNE, UNLOADED = "limit point", "bifurcation", "none", "no unloaded state"
 ENDED = "not looked into"

@@ -2,11 +2,10 @@
 
 A structure is relaxed without load from where the perfect one rests, and then loaded (path_of_one.py), with
 the whole load at first. A step (branch.py) begins along the tangent of the path, whose factor is at hand, and
-goes on by whole steps of Newton's, in a mixed form: stresses are unknowns of their own, which halves the
-number of steps of slender rods. It counts only where every tangent that is made on the way is positive
-definite, the one at its end among them, and no node lands farther than `STRAY` of the span from where the
-path's tangent led; else it is halved, as on any path. So the large steps lead along the same branch as small
-ones do.
+goes on by whole steps of Newton's in a mixed form (structure/solve/whole_steps.py). It counts only where
+every tangent that is made on the way is positive definite, the one at its end among them, and no node lands
+farther than `STRAY` of the span from where the path's tangent led; else it is halved, as on any path. So the
+large steps lead along the same branch as small ones do.
 
 A structure stands if the equilibrium under the whole load is reached so, is stable, and no node is farther
 than `FAR` of the span from the perfect structure's. One that loses stability on the way is relaxed under a
@@ -26,7 +25,6 @@ from shellform.arrays import Reals
 from shellform.errors import require_count
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.branch import Here
 from shellform.reliability.drawing import (
     Errors,
     errors_of,
@@ -48,6 +46,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
 from shellform.structure.solve.loading import SMALLEST
+from shellform.structure.solve.whole_steps import Here
 
 Found = TypeVar("Found")
 

@@ -72,7 +72,7 @@ def test_an_equilibrium_many_times_as_far_off_as_the_start_s_is_another_one(
     assert evaluator.weights == ("start", paths)
     for away, kept in ((0.999 * farthest, True), (1.001 * farthest, False)):
         found = off_by(away)
-        monkeypatch.setattr(evaluation, "find_equilibrium", lambda *_, found=found, **__: found)
+        monkeypatch.setattr(evaluation, "next_equilibrium", lambda *_, found=found, **__: found)
         tried = evaluator._settled(None, None, None)
         assert (tried.state is found.state) == kept
         assert (tried.why == "") == kept
@@ -95,15 +95,15 @@ def test_an_equilibrium_that_is_not_stable_or_not_found_is_none(evaluator, monke
         asked.append(how)
         return off_by(0.01, stable=False)
 
-    monkeypatch.setattr(evaluation, "find_equilibrium", find)
+    monkeypatch.setattr(evaluation, "next_equilibrium", find)
     found = evaluator._settled(None, None, None)
     assert (found.state, found.factorisations) == (None, 3)
-    assert asked == [{"limit": 12, "on_branch": True}]
+    assert asked == [{"limit": 12}]
 
     def none(*_, **__):
         raise NotConverged("no equilibrium", iterations=7)
 
-    monkeypatch.setattr(evaluation, "find_equilibrium", none)
+    monkeypatch.setattr(evaluation, "next_equilibrium", none)
     found = evaluator._settled(None, None, None)
     assert (found.state, found.factorisations) == (None, 7)
     assert "no equilibrium" in found.why

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.branch import ON_THE_WAY, Mass
 from shellform.reliability.drawing import errors_of, variables
 from shellform.reliability.standing import Workshop
 from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.whole_steps import ON_THE_WAY, Mass
 
 
 def test_a_mass_begins_with_the_largest_force_over_a_length_and_eases_by_tenths():

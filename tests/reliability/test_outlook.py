@@ -8,7 +8,7 @@ import pytest
 
 from shellform.errors import NotConverged
 from shellform.reliability import branch
-from shellform.reliability.branch import Branch, Here
+from shellform.reliability.branch import Branch
 from shellform.reliability.perfect import perfect
 from shellform.reliability.refinement import critical_factor
 from shellform.structure.answers.stability import modes
@@ -16,6 +16,7 @@ from shellform.structure.elements.state import at_rest
 from shellform.structure.network import assemble
 from shellform.structure.solve import path
 from shellform.structure.solve.outlook import Outlook
+from shellform.structure.solve.whole_steps import Here
 from tests.gridshell.dishes import dish, first_critical
 
 

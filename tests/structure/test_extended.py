@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from shellform.reliability.branch import ON_THE_WAY, Branch
+from shellform.reliability.branch import Branch
 from shellform.structure.answers.analysis import analyse
 from shellform.structure.elements import double_double
 from shellform.structure.elements.beam import make_beams
@@ -29,6 +29,7 @@ from shellform.structure.solve.extended import (
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.refined import RefinedFactor
 from shellform.structure.solve.residual import ResidualNorm
+from shellform.structure.solve.whole_steps import ON_THE_WAY
 from shellform.verification.cables import hypar
 from shellform.verification.models import CLAMP, chain, line, load_at
 from tests.structure.test_solver import family, random_matrix
