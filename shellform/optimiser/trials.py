@@ -26,12 +26,14 @@ from shellform.optimiser.search_state import (
 from shellform.optimiser.step_model import StepModel
 from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch
 from shellform.problem.paths import follow
+from shellform.reliability.loaded_states import loaded_states
 from shellform.reliability.requirements import FRESH, Required
 from shellform.reliability.trial_structures import JudgedTrial, confirm, judge_trial
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import SMALLEST, apply_load
 
 _ELSEWHERE = 0.1  # of the objective: a design that is worse by more has come to another equilibrium
+_SAME = 1e-6  # relative: violations in two states of one equilibrium
 _COARSE = 0.5  # the first load step of a search for the end of a branch
 
 
@@ -91,16 +93,19 @@ def sound(search: Search, before: Accepted) -> Evaluated | None:
     it doesn't bear all loads there, breaks a constraint, or is worse than it was: of two equilibria side by
     side, a search from design to design may have come to the other one."""
     evaluator, problem = search.evaluator, search.problem
-    loaded = follow(problem.shell, before.built, problem.loads, stay=True)
-    evaluator.factorisations += sum(each.factorisations for each in loaded.values())
-    if not all(each.on_branch for each in loaded.values()):
-        return None
-    states = {name: loaded[name].equilibrium.state for name in evaluator.problem.used()}
+    states, spent = loaded_states(problem.shell, before.built, problem.loads)
+    evaluator.factorisations += spent
+    if states is None:
+        loaded = follow(problem.shell, before.built, problem.loads, stay=True)
+        evaluator.factorisations += sum(each.factorisations for each in loaded.values())
+        if not all(each.on_branch for each in loaded.values()):
+            return None
+        states = {name: each.equilibrium.state for name, each in loaded.items()}
     try:
-        found = evaluator.seed(before.design, states, 1.0)
+        found = evaluator.seed(before.design, {name: states[name] for name in evaluator.problem.used()}, 1.0)
     except OffBranch:
         return None
-    kept = violation(search, found) <= max(before.violation, 0.0)
+    kept = violation(search, found) <= worse(max(before.violation, 0.0), _SAME)
     return found if kept and found.objective <= worse(before.objective, _ELSEWHERE) else None
 
 

@@ -451,6 +451,7 @@ def test_a_search_none_of_whose_designs_is_confirmed_ends_with_the_last_one_that
         ((True, True), 0.0, 0.01, False),
         ((True, True), 0.02, 0.01, True),
         ((True, True), 0.01, 0.02, False),
+        ((True, True), 10.0, 10.0 + 1e-6, True),
         ((True, True), -0.5, 0.0, True),
     ],
 )
@@ -466,6 +467,7 @@ def test_a_design_is_sound_only_where_its_documented_path_bears_every_load_and_b
         assert stay, "what lies beyond a snap-through isn't looked at"
         return {"wet": loaded(on_branch[0]), "wetter": loaded(on_branch[1])}
 
+    monkeypatch.setattr(trials, "loaded_states", lambda *_: (None, 5))
     monkeypatch.setattr(trials, "follow", follow)
     monkeypatch.setattr(trials, "violation", lambda search, point: after)
     end = Point(1.0)
@@ -473,7 +475,7 @@ def test_a_design_is_sound_only_where_its_documented_path_bears_every_load_and_b
     search.evaluator.seed = lambda design, states, stage: end
     own = Accepted(sf_design(), np.ones(2, dtype=bool), before)
     assert (trials.sound(search, own) is end) is is_sound
-    assert search.evaluator.factorisations == 6
+    assert search.evaluator.factorisations == 11
     better = Accepted(sf_design(), np.ones(2, dtype=bool), before, 0.9)
     assert trials.sound(search, better) is None, "its path leads to another equilibrium, which is worse"
     as_good = Accepted(sf_design(), np.ones(2, dtype=bool), before, 0.92)
@@ -484,6 +486,18 @@ def test_a_design_is_sound_only_where_its_documented_path_bears_every_load_and_b
 
     search.evaluator.seed = off
     assert trials.sound(search, own) is None
+
+
+def test_the_documented_path_is_followed_only_where_a_shorter_way_to_its_states_ends(monkeypatch):
+    states = {"wet": "state", "wetter": "another", "told": "left out"}
+    monkeypatch.setattr(trials, "loaded_states", lambda shell, design, loads: (dict(states), 5))
+    monkeypatch.setattr(trials, "follow", None)
+    monkeypatch.setattr(trials, "violation", lambda search, point: 0.0)
+    search = searching(problem=SimpleNamespace(shell=None, loads=None))
+    search.evaluator.seed = lambda design, found, stage: replace(Point(1.0), states=found)
+    found = trials.sound(search, Accepted(sf_design(), np.ones(2, dtype=bool), 0.0))
+    assert found.states == {"wet": "state", "wetter": "another"}
+    assert search.evaluator.factorisations == 5
 
 
 def sf_design():
