@@ -379,7 +379,8 @@ def brace(
             value=joint.gap,
             remedy="Pull the net with the joint's gap.",
         )
-    refuse_thick(rod.section.fibres[0], 2.0, min(net.grid.spacing, net.grid.spacing_v), where="rod.radius")
+    size, wide = rod.section.sizes[0], 2.0 * rod.section.fibres[0]  # its radius or its width
+    refuse_thick(size, wide / size, min(net.grid.spacing, net.grid.spacing_v), where="rod.section")
     bearable = max_radius(net, rod)
     if rod.radius > bearable * (1.0 + 1e-9):
         raise TooCurved(

@@ -10,7 +10,7 @@ from shellform.gridshell.possible_rods import require_rods_material
 from shellform.gridshell.tolerances import Tolerances, enlarged
 from shellform.run.onsite import Survey
 from shellform.run.sizes import DesignWish
-from shellform.structure.elements.sections import Round, isotropic
+from shellform.structure.elements.sections import Rectangle, Round, isotropic
 
 
 @pytest.mark.parametrize(
@@ -50,8 +50,11 @@ def test_no_material_is_so_light_and_stiff_or_so_stiff_and_weak():
 
 def test_rods_as_thick_as_they_are_apart_make_no_grid(net, vault):
     joint, cable = sf.Joint(7.15e4, 7.38e-4, 7.85e-4, net.grid.gap), sf.Cable(187.0)
-    with pytest.raises(InputError, match=r"rod.radius: makes rods 1.2 m wide.*For 0.6 mm write 0.0006\."):
+    with pytest.raises(InputError, match=r"rod.section: makes rods 1.2 m wide.*For 0.6 mm write 0.0006\."):
         sf.brace(net, sf.Rod.round(young=40e9, radius=0.6), joint, cable, below=vault)
+    lath = sf.Rod(Rectangle(0.8, 0.002, isotropic(young=12e9)))
+    with pytest.raises(InputError, match=r"rod.section: makes rods 0.8 m wide.*For 0.8 mm write 0.0008\."):
+        sf.brace(net, lath, joint, cable, below=vault)
 
 
 def test_concrete_as_thick_as_a_fifth_of_its_surface_is_refused(net, vault):
