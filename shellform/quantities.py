@@ -116,12 +116,12 @@ THICKNESS: Final = Quantity(
     (1.5e-3, 0.3),
     LENGTHS,
 )
-# Far above diamond's, 1.2e12, for models whose EI is 1.
+# Below soft foam's, 4e5, and above steel's in MPa; far above diamond's, 1.2e12, for models whose EI is 1.
 YOUNG: Final = Quantity(
     "every rod's modulus is",
     "Pa",
     "pascals, such as 40e9",
-    (1e6, 1e14),
+    (2.5e5, 1e14),
     (1e9, 1e12),
     {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3},
 )
@@ -141,15 +141,15 @@ STRENGTH: Final = Quantity(
     (1e6, 1e10),
     STRESSES,
 )
+# Of models whose load on an area is to stay densities go with 1 over their scale (table 1 of the paper).
 DENSITY: Final = Quantity(
-    "every rod's density is",
+    "every rod's density is, on models too",
     "kg/m³",
     "kg/m³, such as 2000",
-    (10.0, 23e3),
+    (10.0, 1e6),
     (90.0, 23e3),
     DENSITIES,
 )
-# Of models whose load on an area is to stay the density goes with 1 over their scale (table 1 of the paper).
 CONCRETE_DENSITY: Final = Quantity(
     "whatever is poured is, on models too",
     "kg/m³",

@@ -5,22 +5,32 @@ What can't be meant is refused before the net is pulled; what is only unusual is
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from shellform.arrays import Reals
 from shellform.case.case import Case
-from shellform.case.entries import ConcreteEntry, JointsWeightEntry, LoadEntry, PointsEntry, SheetEntry
+from shellform.case.entries import (
+    CableEntry,
+    ConcreteEntry,
+    JointsWeightEntry,
+    LoadEntry,
+    OwnRodEntry,
+    PointsEntry,
+    SheetEntry,
+)
+from shellform.case.sized import STRETCHED
 from shellform.errors import InputError
 from shellform.gridshell.loads import CONCRETE, GRAVITY, as_concrete, refuse_bulk
-from shellform.quantities import DENSITIES, FORCES, LENGTHS, MASSES, if_other_unit
+from shellform.quantities import AREA_MASS, DENSITIES, DENSITY, FORCES, LENGTHS, MASSES, if_other_unit
 from shellform.surface.shape.target import Surface
 
 _THICK = 0.04  # of the larger side: vaults of stone are as thick
 _LIGHT, _HEAVY = 10.0, 2e4  # N/m²: 0.4 mm and 0.8 m of concrete
 _LIKELY = (100.0, 5e3)  # N/m²: 4 mm and 0.2 m of concrete
-_DENSE = 1e4  # kg/m³
+_DENSE, _DENSEST = 1e4, 23e3  # kg/m³: of concrete and of rods
 _FAR = 10.0  # times the larger side: what lies farther away has nothing to do with the surface
 _WIDE = 30.0  # times the larger side, of an outline that then cuts nothing
 _JOINTS = 500.0  # N/m²: as much as 20 mm of concrete
@@ -33,12 +43,13 @@ def refuse_beside(case: Case, surface: Surface) -> None:
         if isinstance(part, ConcreteEntry):
             refuse_bulk(surface, part.thickness, where=f"part.{name}.thickness")
     for where, length in _allowed(case):
-        if length is not None and length > side:
+        meant = if_other_unit(length, LENGTHS, side / 1e4, side / 20.0)
+        if length > side and meant:
             raise InputError(
-                f"lets the shape be farther off than the surface's larger side of {side:.4g} m",
+                f"is more than the surface's larger side of {side:.4g} m",
                 where=where,
                 value=length,
-                remedy=f"Give metres, such as {side / 200.0:.1g}.{if_other_unit(length, LENGTHS, side / 1e4, side / 20.0)}",
+                remedy=f"Give metres, such as {side / 200.0:.1g}, or {0.9 * side:.2g} for no limit.{meant}",
             )
     for where, level in (("edges.ground", case.edges.ground), ("net.ground", case.net.ground)):
         if level is not None:
@@ -50,11 +61,17 @@ def refuse_beside(case: Case, surface: Surface) -> None:
 def doubts(case: Case, surface: Surface) -> tuple[str, ...]:
     """What may have been given in another unit, a sentence each."""
     side, area = float(surface.size.max()), case.net.spacing * (case.net.spacing_v or case.net.spacing)
-    told = []
+    # beside concrete other loads may be light
+    poured = any(isinstance(part, ConcreteEntry) for part in case.part.values())
+    told = [
+        f"{where} is {length:g} m: more than the surface's larger side, so that it limits nothing."
+        for where, length in _allowed(case)
+        if length > side
+    ]
     for where, entry in [("load", case.load), *((f"part.{name}", part) for name, part in case.part.items())]:
         if isinstance(entry, LoadEntry | PointsEntry):
             weight = entry.force / (entry.every * area)
-            if not _LIGHT <= weight <= _HEAVY:
+            if (weight < _LIGHT and not poured) or weight > _HEAVY:
                 meant = if_other_unit(entry.force, FORCES, *(each * entry.every * area for each in _LIKELY))
                 told.append(_doubt(f"{where}.force", f"{entry.force:g} N", as_concrete(weight), meant))
         if isinstance(entry, ConcreteEntry):
@@ -64,10 +81,11 @@ def doubts(case: Case, surface: Surface) -> tuple[str, ...]:
                 told.append(_doubt(f"{where}.thickness", f"{entry.thickness:g} m", much, meant))
             if entry.density > _DENSE:
                 meant = if_other_unit(entry.density, DENSITIES, 300.0, 6e3)
-                much = f"{entry.density / CONCRETE:.3g} times what concrete has"
+                times = f"{entry.density / CONCRETE:.3g}"
+                much = f"{times} times what concrete has, as on a model 1 : {times}"
                 told.append(_doubt(f"{where}.density", f"{entry.density:g} kg/m³", much, meant))
         if isinstance(entry, SheetEntry) and entry.mass * GRAVITY > _HEAVY / 10.0:
-            meant = if_other_unit(entry.mass, MASSES, 0.1, 100.0).replace(" g ", " g/m² ")
+            meant = if_other_unit(entry.mass, AREA_MASS.units, 0.1, 100.0)
             much = as_concrete(entry.mass * GRAVITY)
             told.append(_doubt(f"{where}.mass", f"{entry.mass:g} kg/m²", much, meant))
         if isinstance(entry, JointsWeightEntry) and entry.mass * GRAVITY > _JOINTS * area:
@@ -78,26 +96,44 @@ def doubts(case: Case, surface: Surface) -> tuple[str, ...]:
     if outline > _WIDE * side:
         much = f"{outline / side:.0f} times as wide as the surface, so that it cuts nothing"
         told.append(_doubt("net.outline", f"{outline:g} m wide", much, ""))
-    strained = case.cable.stiffness * (1.0 / case.cable.rest_ratio - 1.0)
-    if strained > case.cable.force_max:
-        much = f"less than the {strained:.3g} N to which cable.rest_ratio strains cables of {case.cable.stiffness:g} N"
-        meant = if_other_unit(case.cable.force_max, FORCES, strained, case.cable.stiffness)
-        told.append(_doubt("cable.force_max", f"{case.cable.force_max:g} N", much, meant))
-    return tuple(told)
+    if isinstance(case.rod, OwnRodEntry) and case.rod.density > _DENSEST:
+        meant = if_other_unit(case.rod.density, DENSITIES, *DENSITY.usual)
+        much = "more than any material has, as on a model whose weights are to suit its loads"
+        told.append(_doubt("rod.density", f"{case.rod.density:g} kg/m³", much, meant))
+    return (*told, *_of_cables(case.cable))
+
+
+def _of_cables(cable: CableEntry) -> Iterator[str]:
+    """Where the largest force is less than what cables begin with, or no cable comes to it."""
+    most, value = cable.force_max, f"cable.force_max is {cable.force_max:g} N"
+    strained = cable.stiffness * (1.0 / cable.rest_ratio - 1.0)
+    if strained > most:
+        within = math.ceil(1e4 / (1.0 + most / cable.stiffness)) / 1e4
+        begin = f" With cable.rest_ratio = {within:g} cables begin within it." if within < 1.0 else ""
+        yield (
+            f"{value}: less than the {strained:.3g} N to which cable.rest_ratio strains cables of {cable.stiffness:g} N."
+            f"{begin}{if_other_unit(most, FORCES, strained, cable.stiffness)}"
+        )
+    if most > STRETCHED * cable.stiffness:
+        yield f"{value}: so much as no cable of {cable.stiffness:g} N bears, so that it limits nothing."
 
 
 def _doubt(where: str, value: str, what: str, meant: str) -> str:
     return f"{where} is {value}: {what}. Is the unit right?{meant}"
 
 
-def _allowed(case: Case) -> Iterator[tuple[str, float | None]]:
-    """How far the shape may be off, m, by the entries."""
-    yield "limits.deviation", case.limits.deviation
-    yield "limits.built_deviation", case.limits.built_deviation
-    yield "optimise.deviation", case.optimise.deviation
-    yield "optimise.misfit_rms_additional", case.optimise.misfit_rms_additional
-    yield "robust.limit", None if case.robust is None else case.robust.limit
-    yield "figures.limit", case.figures.limit
+def _allowed(case: Case) -> Iterator[tuple[str, float]]:
+    """How far the shape may be off, m, by the entries that say so."""
+    for where, length in (
+        ("limits.deviation", case.limits.deviation),
+        ("limits.built_deviation", case.limits.built_deviation),
+        ("optimise.deviation", case.optimise.deviation),
+        ("optimise.misfit_rms_additional", case.optimise.misfit_rms_additional),
+        ("robust.limit", None if case.robust is None else case.robust.limit),
+        ("figures.limit", case.figures.limit),
+    ):
+        if length is not None:
+            yield where, length
 
 
 def _curves(case: Case) -> Iterator[tuple[str, Sequence[tuple[float, float]]]]:

@@ -186,7 +186,9 @@ class CableEntry(Entry):
     rest_ratio: float = Field(
         0.99, gt=0.0, lt=1.0, description="initial rest length over length in the target"
     )
-    force_max: PositiveFloat = Field(description="largest allowed tension, N (constraint 5)")
+    force_max: PositiveFloat = Field(
+        description="largest allowed tension, N (constraint 5); as much as the stiffness limits nothing"
+    )
     edge_cells: bool | None = Field(
         None,
         description="candidates in cells at the edge with three joints too; left out: with optimise.method paper",
@@ -303,7 +305,7 @@ class OptimiseEntry(Entry):
     )
     radius_min: PositiveFloat | None = Field(None, description="bound (4), m; left out: half the start's")
     misfit_rms_additional: PositiveFloat = Field(
-        description="constraint (6) as root mean square distance a node, m"
+        description="constraint (6) as root mean square distance a node, m; as much as the surface's larger side limits nothing"
     )
     evaluations: PositiveInt = Field(
         100,

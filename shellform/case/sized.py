@@ -26,7 +26,7 @@ AreaMass = Annotated[PositiveFloat, AfterValidator(quantities.AREA_MASS.require)
 JointMass = Annotated[PositiveFloat, AfterValidator(quantities.JOINT_MASS.require)]
 PlaceDeviation = Annotated[NonNegativeFloat, AfterValidator(quantities.PLACE_DEVIATION.or_none)]
 
-_STRETCHED = 5.0  # strain of rubber where it breaks
+STRETCHED = 5.0  # strain of rubber where it breaks
 _UNSTRETCHED = 1e-5  # strain to which no cable is set: a thousandth of steel's where it breaks
 
 
@@ -34,13 +34,13 @@ def refuse_strain(stiffness: float, force_max: float) -> None:
     """Raises InputError for cables of a stiffness EA, N, that no cable has beside the largest force, N, which
     it is let bear."""
     strain = force_max / stiffness
-    if strain > _STRETCHED:
+    meant = if_other_unit(stiffness, FORCES, force_max, 1e4 * force_max)
+    if strain > STRETCHED and meant:
         raise InputError(
             f"lets cables pull {force_max:g} N, at which they would be {1.0 + strain:.3g} times as long",
             where="cable.stiffness",
             value=stiffness,
-            remedy="Give EA and cable.force_max both in newtons."
-            + if_other_unit(stiffness, FORCES, force_max, 1e4 * force_max),
+            remedy=f"Give EA and cable.force_max both in newtons, or cable.force_max = {stiffness:g} for no limit.{meant}",
         )
     if strain < _UNSTRETCHED:
         raise InputError(

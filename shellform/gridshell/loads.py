@@ -131,7 +131,7 @@ def pressure(thickness: float, density: float) -> float:
 def as_concrete(weight: float) -> str:
     """What a weight, N/m², is like."""
     thickness = weight / (GRAVITY * CONCRETE)
-    size = f"{thickness:.2g} m" if thickness >= 1.0 else f"{1e3 * thickness:.2g} mm"
+    size = f"{thickness:.2g} m" if thickness >= 0.995 else f"{float(f'{1e3 * thickness:.2g}'):g} mm"
     return f"{weight:.3g} N/m², as {size} of concrete"
 
 

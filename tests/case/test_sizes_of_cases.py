@@ -114,6 +114,7 @@ def test_edge_beams_and_weights_on_an_area_are_refused_alike():
         (VAULT, ["rod.young=0.3e9", "rod.strength=20e6", "rod.density=920"]),  # polyethylene
         (VAULT, ["rod.young=900e9", "rod.strength=4e9", "rod.density=2200"]),  # carbon
         (VAULT, ["rod.young=1e9", "rod.strength=10e6", "rod.density=100"]),  # foam
+        (VAULT, ["rod.young=0.4e6", "rod.strength=0.2e6", "rod.density=35"]),  # soft foam
         (VAULT, ["cable.stiffness=7.0"]),  # rubber bands
         (DOME, ["part.concrete.density=50000"]),  # a model whose load on an area is that of a shell
         (DOME, ["part.concrete.thickness=0.002"]),
@@ -162,6 +163,49 @@ def test_levels_and_curves_far_from_the_surface_are_refused(vault, setting, said
     assert re.search(said, told(DOME, setting, beside=vault))
 
 
+@pytest.mark.parametrize(
+    ("settings", "left_out"),
+    [
+        (["optimise.misfit_rms_additional=1.0"], "optimise.misfit_rms_additional={}"),
+        (["limits.deviation=20"], "limits.deviation={}"),
+        (["cable.force_max=1e4", "cable.stiffness=187"], "cable.force_max={}"),
+    ],
+)
+def test_a_limit_as_large_as_a_wrong_unit_s_is_told_how_it_limits_nothing(vault, settings, left_out):
+    said = told(VAULT, *settings, beside=vault)
+    number = re.search(r"or (?:cable\.force_max = )?(\S+) for no limit", said)[1]
+    case = read(VAULT, [*settings, left_out.format(number)], vault)
+    assert doubts(case, vault) == ()
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("optimise.misfit_rms_additional=1e3", "is 1000 m: more than the surface's larger side, so that it"),
+        (
+            "cable.force_max=1e9",
+            r"is 1e\+09 N: so much as no cable of 187 N bears, so that it limits nothing",
+        ),
+    ],
+)
+def test_a_limit_that_is_in_no_other_unit_either_limits_nothing_and_is_told(vault, setting, said):
+    case = read(VAULT, [setting], vault)
+    (doubt,) = doubts(case, vault)
+    assert re.search(said, doubt), doubt
+
+
+def test_light_points_beside_concrete_leave_no_doubt(vault):
+    clips = 'part.rods={kind = "points", force = 0.01}'
+    assert doubts(read(DOME, [clips], vault), vault) == ()
+
+
+def test_cables_that_begin_beyond_their_largest_force_are_told_a_ratio_with_which_they_do_not(vault):
+    case = load_case(VAULT, ["cable.rest_ratio=0.9"])
+    (doubt,) = doubts(case, vault)
+    ratio = re.search(r"With (cable.rest_ratio = \S+) cables begin within it\.", doubt)[1]
+    assert doubts(load_case(VAULT, [ratio]), vault) == ()
+
+
 def test_openings_of_the_vault_s_case_in_millimetres_are_refused(vault):
     case = load_case(VAULT)
     refuse_beside(case, vault)
@@ -187,6 +231,11 @@ def test_shipped_cases_leave_no_doubt(vault):
         ),
         (DOME, ["part.concrete.density=25000"], "10 times what concrete has.* For 25000 N/m³ write 2548.42."),
         (DOME, ["part.concrete.thickness=0.1"], "a 9th of the surface's .* For 0.1 cm write 0.001."),
+        (
+            VAULT,
+            ["rod.density=40000"],
+            "density is 40000 kg/m³: more than any .* For 40000 N/m³ write 4077.47.",
+        ),
         (DOME, ['part.rods={kind = "membrane", mass = 400}'], "mass is 400 kg/m².*For 400 g/m² write 0.4."),
         (DOME, ['part.rods={kind = "joints", mass = 5}'], "mass is 5 kg: .*For 5 g write 0.005."),
         (DOME, ["net.outline=[[-400, -200], [400, -200], [400, 200]]"], "887 times as wide as the surface"),
