@@ -36,10 +36,8 @@ ELEMENTS = 2  # a segment
 NEEDED = 1.5  # times the design load, which the perfect structure bears: drawn ones fall earlier
 ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path the design load then is
 DRAWN, SEED, ENLARGED = 40, 1, 1.25  # structures, their seed, and how much larger their errors are
-LOOKED_AT, JUDGED = (
-    20,
-    0,
-)  # structures of which the shape is looked at, and the seed under which a case has them
+LOOKED_AT = 20  # structures of which the shape is looked at
+JUDGED = 0  # the seed under which a case has them
 STRESSED = 0.95  # of the strength, at the most, under the additional load
 PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond it takes no cables away
 _RELIEVED = 1.5  # with which power of the force in excess a section has to grow: stiffer strands bear more of the load

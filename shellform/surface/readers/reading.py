@@ -42,10 +42,8 @@ _STATED_UP = ("gltf",)  # formats that say which axis is vertical
 _TURNED = "its {} axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"
 # that are taken for the vertical, in this order, where a shell would lie on its side; z is looked at first
 _OTHER_AXES = ("y", "x")
-_ROUND, _TOOTHED = (
-    24,
-    np.deg2rad(35.0),
-)  # an edge's vertices at least; what half of them turn by, if not smooth
+_ROUND = 24  # an edge's vertices, at the least, that may be toothed
+_TOOTHED = np.deg2rad(35.0)  # what half of them turn by, if it is
 _RAGGED = (
     "its edge is toothed, turning by {:.0f}° or more at half of its vertices: rods end along a smooth line, so "
     "trim it to one"
