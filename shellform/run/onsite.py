@@ -66,7 +66,6 @@ def calibrate(
     a case says; LOAD is a load case or a CSV file of forces. Writes calibration.csv and calibration.toml.
     Raises InputError, NotConverged."""
     measurements.check_noise(noise)
-    PLACE_DEVIATION.require(noise, where="--noise")
     grid = scanned(source, design, output, allow_scripts=allow_scripts)
     shell = grid.shell
     pairs = [scan_under(each, grid, unit, None if placed else 0) for each in scans]
@@ -107,7 +106,7 @@ class Survey:
     after: Path | None = None
 
     def __post_init__(self) -> None:
-        PLACE_DEVIATION.require(self.noise, where="--noise")
+        measurements.check_noise(self.noise)
         PLACE_DEVIATION.require(self.length_error, where="--length-error")
         TURN.require(self.step, where="--step")
         TURN.require(self.largest, where="--largest")
@@ -312,7 +311,6 @@ def _scaffold(borne: Props) -> str:
 
 def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.Belief]:
     """The design's name, its shell, and what is believed of it: as drawn, or after the round before."""
-    measurements.check_noise(options.noise)
     name = design_named(run, options.design, run.best)
     require_known(options.load, run.loads, where="--load", what="there is no such load case")
     shell, load = run.shell_of(name), run.loads[options.load]

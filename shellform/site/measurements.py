@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, how_many, require_file, require_number, unreadable
+from shellform.errors import InputError, how_many, require_file, unreadable
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.quantities import PLACE_DEVIATION
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,7 @@ _TABLE = "Give a table as CSV in UTF-8, with a head line."
 def check_noise(noise: float) -> None:
     """Raises InputError for a standard deviation of measured coordinates, m, whose square is nothing or all
     beside them."""
-    give = "metres, one standard deviation of a measured coordinate, such as 0.0005"
-    require_number(noise, least=1e-9, most=1e3, where="--noise", give=give)
+    PLACE_DEVIATION.require(noise, where="--noise")
 
 
 def text_of(path: str | Path, remedy: str) -> str:

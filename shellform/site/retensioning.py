@@ -24,6 +24,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.errors import InputError, NotConverged, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.quantities import PLACE_DEVIATION
 from shellform.site.measurements import check_noise
 from shellform.site.turns import Crew as Crew  # what an adjustment is asked with
 from shellform.site.turns import whole_turns
@@ -113,9 +114,7 @@ def first_belief(
 ) -> Belief:
     """What is believed before the first survey: lengths as drawn with the usual error `length_error`, m (one
     standard deviation), of a cable; `state` is the design's equilibrium under the `load`."""
-    require_number(
-        length_error, least=1e-9, most=1.0, where="--length-error", give="metres a cable, such as 0.0001"
-    )
+    PLACE_DEVIATION.require(length_error, where="--length-error")
     count = int(design.present.sum())
     if count == 0:
         raise InputError("has no cables to turn", where="design", remedy="Name a design that has cables.")

@@ -185,11 +185,11 @@ def test_an_origin_too_near_to_be_told_from_what_is_measured_stays():
     np.testing.assert_array_equal(places, [[0.0, 0.0, 0.0], [np.nan] * 3])
 
 
-def test_noise_is_between_a_nanometre_and_a_kilometre():
-    for noise in (1e-9, 0.0005, 1e3):
+def test_noise_is_between_a_nanometre_and_a_metre():
+    for noise in (1e-9, 0.0005, 1.0):
         check_noise(noise)
-    for noise in (0.99e-9, 1.01e3, math.nan):
-        with pytest.raises(InputError, match=r"--noise.*such as 0\.0005"):
+    for noise in (0.99e-9, 1.01, math.nan):
+        with pytest.raises(InputError, match=r"--noise.*such as 0\.0001"):
             check_noise(noise)
 
 

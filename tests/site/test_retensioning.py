@@ -186,7 +186,7 @@ def test_what_a_crew_or_a_survey_can_t_be_is_refused(shell, belief, errors, uppe
         Crew(step=2.0, largest=1.0, cables=1)
     with pytest.raises(InputError, match="at least 1"):
         Crew(step=1.0, largest=1.0, cables=0)
-    with pytest.raises(InputError, match="--length-error: must be between"):
+    with pytest.raises(InputError, match="--length-error: must be positive"):
         first_belief(shell, belief.design, belief.state, belief.load, length_error=0.0)
     with pytest.raises(InputError, match="no cables"):
         first_belief(shell, shell.unbraced(), belief.state, belief.load, length_error=1e-3)
@@ -197,7 +197,7 @@ def test_what_a_crew_or_a_survey_can_t_be_is_refused(shell, belief, errors, uppe
     with pytest.raises(InputError, match="must be positive"):
         learn(shell, belief, upper, np.zeros((len(upper), 3)), noise=0.0)
     goal, crew = belief.state.positions, Crew(1e-3, 1e-3, 5)
-    with pytest.raises(InputError, match="--noise: must be between"):
+    with pytest.raises(InputError, match="--noise: must be positive"):
         adjust(shell, belief, goal, crew, noise=-1e-4)
     with pytest.raises(InputError, match=r"--slip: must be between 0 and 1.*For 5 % write 0\.05"):
         replay(shell, belief, errors, goal, upper, crew, noise=NOISE, rounds=1, seed=0, slip=5)
