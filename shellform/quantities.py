@@ -84,6 +84,14 @@ ROD_SIZE: Final = Quantity(
     (1e-4, 0.5),
     MILLIMETRES,
 )
+EDGE_SIZE: Final = Quantity(
+    "every edge beam's radius, wall, width or height is",
+    "m",
+    "metres, such as 0.0012",
+    (1e-5, 2.0),
+    (1e-4, 1.5),
+    MILLIMETRES,
+)
 DIAMETER: Final = Quantity(
     "every rod's diameter, wall, width or height is",
     "m",

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from shellform.case.entries import Entry
-from shellform.case.sized import Density, RodSize, Strength, Young
+from shellform.case.sized import Density, EdgeSize, Strength, Young
 
 
 class EdgeBeamEntry(Entry):
@@ -21,10 +21,10 @@ class EdgeBeamEntry(Entry):
     composite: float = Field(
         0.5, ge=0.0, le=1.0, description="how far a bundle's rods act together, 1 as if glued, 0 loose"
     )
-    radius: RodSize | None = Field(None, description="of one round rod or tube, m")
-    wall: RodSize | None = Field(None, description="of a tube, m")
-    width: RodSize | None = Field(None, description="of a lath in the surface, m")
-    height: RodSize | None = Field(None, description="of a lath across the surface, m")
+    radius: EdgeSize | None = Field(None, description="of one round rod or tube, m")
+    wall: EdgeSize | None = Field(None, description="of a tube, m")
+    width: EdgeSize | None = Field(None, description="of a lath in the surface, m")
+    height: EdgeSize | None = Field(None, description="of a lath across the surface, m")
     catalogue: str | None = Field(None, description="a shipped catalogue's name, or a TOML file")
     section: str | None = Field(None, description='of the catalogue, like "42 x 3.5 mm"')
     young: Young | None = Field(None, description="Pa; left out: as the rods")

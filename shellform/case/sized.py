@@ -13,6 +13,7 @@ from shellform.quantities import FORCES, if_other_unit
 Spacing = Annotated[PositiveFloat, AfterValidator(quantities.SPACING.require)]
 Gap = Annotated[PositiveFloat, AfterValidator(quantities.GAP.require)]
 RodSize = Annotated[PositiveFloat, AfterValidator(quantities.ROD_SIZE.require)]
+EdgeSize = Annotated[PositiveFloat, AfterValidator(quantities.EDGE_SIZE.require)]
 Young = Annotated[PositiveFloat, AfterValidator(quantities.YOUNG.require)]
 Shear = Annotated[PositiveFloat, AfterValidator(quantities.SHEAR.require)]
 Strength = Annotated[PositiveFloat, AfterValidator(quantities.STRENGTH.require)]

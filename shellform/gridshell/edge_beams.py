@@ -29,6 +29,7 @@ from shellform.errors import InputError, require_count, require_number
 from shellform.gridshell.loads import GRAVITY
 from shellform.gridshell.possible_rods import require_section
 from shellform.net.net import Net
+from shellform.quantities import EDGE_SIZE
 from shellform.structure.elements.beam import Beams, built_in, joined
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.sections import (
@@ -120,7 +121,7 @@ class EdgeBeam:
     section: Section
 
     def __post_init__(self) -> None:
-        require_section(self.section, where="edges.beam")
+        require_section(self.section, EDGE_SIZE, where="edges.beam")
 
     @property
     def stiffness(self) -> BeamStiffness:

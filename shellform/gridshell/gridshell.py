@@ -25,7 +25,7 @@ from shellform.gridshell.loads import points
 from shellform.gridshell.possible_rods import refuse_thick, require_section
 from shellform.net.grid import ROD, grid_beams
 from shellform.net.net import Net
-from shellform.quantities import GAP
+from shellform.quantities import GAP, ROD_SIZE
 from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.sections import (
@@ -54,7 +54,7 @@ class Rod:
     section: Section
 
     def __post_init__(self) -> None:
-        require_section(self.section, where="rod.section")
+        require_section(self.section, ROD_SIZE, where="rod.section")
 
     @classmethod
     def round(

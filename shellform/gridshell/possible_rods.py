@@ -9,11 +9,11 @@ from shellform.quantities import (
     DENSITIES,
     DENSITY,
     MILLIMETRES,
-    ROD_SIZE,
     SHEAR,
     STRENGTH,
     STRESSES,
     YOUNG,
+    Quantity,
     if_other_unit,
 )
 from shellform.structure.elements.sections import Section
@@ -51,12 +51,13 @@ def require_rods_material(
         )
 
 
-def require_section(section: Section, *, where: str) -> None:
-    """Raises InputError for a section, given `where`, of a size or of a material that no rod has."""
+def require_section(section: Section, sizes: Quantity, *, where: str) -> None:
+    """Raises InputError for a section, given `where`, of a material that no rod has or of other than possible
+    `sizes`."""
     own = section.material
     require_rods_material(own.young, own.shear, own.strength, own.density, where="material")
     for size in section.sizes:
-        ROD_SIZE.require(size, where=where)
+        sizes.require(size, where=where)
 
 
 def refuse_thick(size: float, times: float, spacing: float, *, where: str) -> None:

@@ -57,6 +57,13 @@ def test_rods_as_thick_as_they_are_apart_make_no_grid(net, vault):
         sf.brace(net, lath, joint, cable, below=vault)
 
 
+def test_an_edge_beam_may_be_higher_than_any_rod():
+    beam = Rectangle(0.4, 1.2, isotropic(young=11e9, strength=28e6, density=450.0))
+    assert EdgeBeam(beam).section.sizes == (0.4, 1.2)
+    with pytest.raises(InputError, match=r"rod.section: must be between 1e-05 and 0.9 m"):
+        sf.Rod(beam)
+
+
 def test_concrete_as_thick_as_a_fifth_of_its_surface_is_refused(net, vault):
     thick = 0.21 * float(vault.size.max())
     with pytest.raises(InputError, match=r"load.thickness: makes a block of a surface"):
