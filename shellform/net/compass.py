@@ -28,6 +28,9 @@ from shellform.net.refusal import NoNet, Reason
 _ITERATIONS = 30  # of Newton towards one point, at the most
 _CLOSE = 1e-10  # of the spacing
 _PARALLEL = 0.05  # sine of the angle between two rods, below which they run in one direction
+_LITTLE = (
+    0.25 * math.pi
+)  # of the π/2 by which the rods of a quadrant between straight guides come to be parallel
 _MOST = 200_000  # crossings
 _MOST_STEPS = 4000  # of one guide
 
@@ -250,17 +253,20 @@ def _broken(
         for b in range(0, j, step_j)
         if all(p in points for p in ((a, b), (a + step_i, b), (a + step_i, b + step_j), (a, b + step_j)))
     ]
-    total = float(gaussian(finder, np.array(cells)).sum()) if cells else 0.0
-    return NoNet(
-        Reason.BROKEN,
-        "the surface is curved too much for one net: its rods come to run in one direction at "
-        f"{at.round(3).tolist()}; from the net's "
-        f"origin to there its Gaussian curvature adds up to {total:.2f} (no patch of a net holds 2π = "
-        f"{2 * math.pi:.2f})",
-        where="net.spacing",
-        value=spacing[0],
-        remedy="Try another net.angle or net.offset; where none helps it takes a flatter form.",
-    )
+    total = float(gaussian(finder, np.array(cells)).sum()) if cells else math.nan
+    parallel = f"its rods come to run in one direction at {at.round(3).tolist()}"
+    counted = "from the net's origin to there its Gaussian curvature adds up to"
+    what = f"the surface is curved too much for one net: {parallel}"
+    remedy = "Try another net.angle or net.offset; where none helps it takes a flatter form."
+    if abs(total) < _LITTLE:
+        what = (
+            f"the surface isn't smooth enough for a net: {parallel}, though {counted} {total:.2f} only, where "
+            f"π/2 = {0.5 * math.pi:.2f} does that. A crease does, a dent, or an edge that turns to and fro"
+        )
+        remedy = "Smooth the surface or its edge there, or try another net.angle or net.offset."
+    elif cells:
+        what += f"; {counted} {total:.2f} (no patch of a net holds 2π = {2 * math.pi:.2f})"
+    return NoNet(Reason.BROKEN, what, where="net.spacing", value=spacing[0], remedy=remedy)
 
 
 def gaussian(finder: Finder, corners: Reals) -> Reals:
