@@ -301,27 +301,6 @@ def test_objects_and_groups_of_an_obj_file_can_be_chosen(tmp_path):
         read_surface(file)
 
 
-def test_a_toothed_edge_is_told_and_a_smooth_or_a_coarse_one_is_not(tmp_path):
-    def noted(name, points, faces):
-        return any(
-            "toothed" in note for note in read_surface(write_obj(tmp_path / name, points, faces)).mended
-        )
-
-    x, y = (each.ravel() for each in np.meshgrid(np.arange(13.0), np.arange(13.0), indexing="ij"))
-    points = np.column_stack([x, y, 0.03 * x * (12.0 - x)])
-    corner = np.array([13 * i + j for i in range(12) for j in range(12)])
-    quads = np.column_stack([corner, corner + 13, corner + 14, corner + 1])
-    triangles = split(quads)
-    on_edge = ((points[:, :2] == 0.0) | (points[:, :2] == 12.0)).any(axis=1)
-    assert not noted("whole.obj", points, quads)
-    assert noted("scan.obj", points, triangles[on_edge[triangles].sum(axis=1) < 2])
-    assert noted("round.obj", points, quads[np.hypot(*(points[quads].mean(axis=1)[:, :2] - 6.0).T) < 5.0])
-    turn = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
-    ring = np.column_stack([3.0 * np.cos(turn), 3.0 * np.sin(turn), 0.0 * turn])
-    fan = np.array([[8, k, (k + 1) % 8] for k in range(8)])
-    assert not noted("octagon.obj", np.vstack([ring, [[0.0, 0.0, 1.0]]]), fan)
-
-
 def test_an_unknown_ending_is_read_by_its_content(tmp_path):
     same_shell(read_surface(write_obj(tmp_path / "shell.txt", POINTS, QUADS)))
     same_shell(read_surface(write_stl(tmp_path / "shell", POINTS, TRIANGLES)))

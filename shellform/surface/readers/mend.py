@@ -3,7 +3,7 @@
 In this order: vertices at one place are merged, faces that shrink to nothing or are given twice and points of
 no face dropped; edges of neighbouring patches that nearly touch are sewn (seams.py); a piece is chosen; faces
 are turned alike; slivers are collapsed or flipped; of a closed skin the upper or lower face is taken
-(sides.py); and a vertex at which the edge meets itself is parted.
+(sides.py); a vertex at which the edge meets itself is parted; and toothed edges are made smooth (teeth.py).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Draft, choosable
 from shellform.surface.readers.seams import sewn, without_slivers
 from shellform.surface.readers.sides import shared_edges, side_of
+from shellform.surface.readers.teeth import without_teeth
 
 _SAME = 1e-8  # of the size: vertices nearer than that are one
 _FLAT = 1e-9  # of the squared size: a surface smaller than that has no area
@@ -65,7 +66,7 @@ def mended(draft: Draft, where: str, *, face: str | None = None, piece: int | No
                 "faces were turned the same way as the others",
             ),
         )
-    return _parted(_open(without_slivers(draft), face, where), size)
+    return without_teeth(_parted(_open(without_slivers(draft), face, where), size))
 
 
 def turned_alike(triangles: Indices, where: str) -> Indices:

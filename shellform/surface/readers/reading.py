@@ -19,6 +19,7 @@ from shellform.surface.readers import compas, compas_surfaces, foreign, plain
 from shellform.surface.readers.draft import MOST_BYTES, Choice, Draft
 from shellform.surface.readers.fills import filled
 from shellform.surface.readers.mend import mended, noted
+from shellform.surface.readers.teeth import is_ragged
 from shellform.surface.shape.target import Surface, make_surface
 from shellform.surface.units import downwards, turned_back, turned_up, unit_factor
 
@@ -42,12 +43,7 @@ _STATED_UP = ("gltf",)  # formats that say which axis is vertical
 _TURNED = "its {} axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"
 # that are taken for the vertical, in this order, where a shell would lie on its side; z is looked at first
 _OTHER_AXES = ("y", "x")
-_ROUND = 24  # an edge's vertices, at the least, that may be toothed
-_TOOTHED = np.deg2rad(35.0)  # what half of them turn by, if it is
-_RAGGED = (
-    "its edge is toothed, turning by {:.0f}° or more at half of its vertices: rods end along a smooth line, so "
-    "trim it to one"
-)
+_RAGGED = "its edge is toothed and was left so: rods end along a smooth line, so trim it to one if teeth aren't meant"
 _LEVEL = 0.01  # of the rise: points as high as others
 _COARSE = 1e-4  # of the extent, that coordinates lie apart: rounding bends what is flat
 _STEPS = (
@@ -171,7 +167,7 @@ def _closed(whole: Draft, vertical: str, source: str, fill: str | None, ground: 
 def _doubts(surface: Surface, vertical: str) -> tuple[str, ...]:
     """What tells that a surface's edge is no line that rods can end along, or that another axis of its file
     is the vertical one, with that axis."""
-    ragged = _ragged(surface)
+    ragged = (_RAGGED,) if any(is_ragged(surface.vertices, loop) for loop in surface.boundary) else ()
     plan = _plan_share(surface.vertices, surface.triangles)
     if plan >= _UPRIGHT:
         return (*ragged, _HANGS.format(downwards(vertical))) if _hangs(surface.vertices, surface) else ragged
@@ -183,17 +179,6 @@ def _doubts(surface: Surface, vertical: str) -> tuple[str, ...]:
             found = downwards(axis) if _hangs(points, surface) else axis
             return (*ragged, f"{told}: give its {found} axis for the vertical (surface.up, --up {found})")
     return (*ragged, f"{told}, and so it does with any other of its axes for the vertical")
-
-
-def _ragged(surface: Surface) -> tuple[str, ...]:
-    """What tells that an edge is toothed, as a scan's is, or one that was cut out by whole faces."""
-    for edge in surface.boundary:
-        steps = np.diff(surface.vertices[np.append(edge, edge[:1])], axis=0)
-        steps /= np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-300)
-        turn = np.arccos(np.clip(np.sum(steps * np.roll(steps, -1, axis=0), axis=1), -1.0, 1.0))
-        if len(edge) >= _ROUND and np.median(turn) > _TOOTHED:
-            return (_RAGGED.format(np.rad2deg(np.median(turn))),)
-    return ()
 
 
 def _step_of_32_bits(draft: Draft) -> float:

@@ -1,0 +1,275 @@
+"""A toothed edge made smooth: that of a mesh cut out of a grid or a scan by whole faces, which turns to and
+fro by an element.
+
+No strip goes on past such an edge (shape/extension.py), and rods' ends and edge beams would follow its teeth.
+A tooth is two sharp corners in a row that turn the edge opposite ways, an element apart. Along teeth the
+edge's vertices move to the curve that weighs how far it lies from them against how it bends: x with
+(W + k B'B) x = W p, B the second differences along the edge and k such that waves of less than two square
+roots of the number of vertices go. The weights W grow where x would lie farther from p than a tooth, and are
+large where there are no teeth, so that corners that are meant stay. Moved vertices are put onto the surface,
+or where it goes on past its edge, by a quadratic fitted to those around. Triangles that become slivers or
+turn over are dropped, and the vertices that then lie on the edge are moved to the curve too.
+
+An edge whose sides are longer than an eighth of the surface's extent, or that has few teeth, is meant so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import spsolve
+from scipy.spatial import cKDTree
+
+from shellform.arrays import Flags, Indices, Reals
+from shellform.errors import how_many
+from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.sides import shared_edges
+from shellform.surface.shape.target import across_edges, closed_loops, rough_normals
+from shellform.surface.shape.tree import Tree
+
+_FEWEST = 24  # vertices of an edge with teeth
+_TEETH = 8  # of an edge, at the least
+_SHARP_TURN = np.deg2rad(35.0)  # at a corner of a tooth
+_CORNER = np.deg2rad(77.0)  # of the smooth curve's turn at a corner that is meant: right angles come to 80
+_LONG = 1.6  # median sides of the edge: the longest side of a tooth
+_MEANT = 0.125  # of the narrower extent: longer sides aren't a tooth's
+_WAVES = 2.0  # square roots of the number of vertices: the length of waves that are halved
+_FIXED = 1e8  # the weight of vertices that stay
+_TIGHTENINGS = 40  # of the weights, at the most
+_AROUND = 24  # vertices to which the surface is fitted
+_THIN = 0.1  # of the edge's median side: the least height of a triangle
+_ROUNDS = 12  # of dropping triangles
+_PEELED = 3  # times that spikes are taken off an edge too ragged to be smoothed
+
+
+def without_teeth(draft: Draft) -> Draft:
+    """The draft, in one piece and turned alike, with its toothed edges smooth, and a note of how far they
+    moved at most; as it is where no edge is toothed, or where what would be left hangs together no more."""
+    points, faces = draft.points, draft.triangles
+    for _ in range(1 + _PEELED):
+        curves = [
+            (loop, side)
+            for loop in closed_loops(_rim(faces, len(points)))
+            if (side := toothed(points, loop)) is not None
+        ]
+        if not curves:
+            return draft
+        found = _smoothed(points, faces, curves)
+        if found is not None:
+            return _told(draft, *found, len(curves))
+        faces = _without_spikes(faces, len(points))
+    return draft
+
+
+def _smoothed(
+    points: Reals, faces: Indices, curves: Sequence[tuple[Indices, float]]
+) -> tuple[Reals, Indices, Tree] | None:
+    """The points (v, 3) and the triangles that are left with smooth edges where these loops of vertices with
+    their median sides, m, are; and the curves' straight pieces. None where triangles that turn over can't be
+    dropped."""
+    placed, on_edge = points.copy(), np.zeros(len(points), dtype=bool)
+    on_edge[_rim(faces, len(points))] = True
+    for loop, side in curves:
+        placed[loop] = _curve(points[loop], side)
+    moved = (placed != points).any(axis=1)
+    placed[moved] = _onto(points, rough_normals(points, faces), placed[moved])
+    after = [np.roll(loop, -1) for loop, _ in curves]
+    pieces = [placed[np.stack([loop, to, to], axis=1)] for (loop, _), to in zip(curves, after, strict=True)]
+    track = Tree(np.vstack(pieces))
+    thin = _THIN * min(side for _, side in curves)
+    for _ in range(_ROUNDS):
+        rim = _rim(faces, len(points))
+        bared = np.setdiff1d(rim, np.flatnonzero(on_edge))
+        placed[bared] = track.nearest(placed[bared])[1]
+        on_edge[bared] = moved[bared] = True
+        turned, low = _poor(points, placed, faces, thin)
+        dropped = (turned | low) & moved[faces].any(axis=1) & (_on_rim(faces, len(points)) > 0)
+        if not dropped.any():  # what turns over behind the edge: the vertices of the edge that came too far
+            dropped = np.isin(faces, np.intersect1d(faces[turned], rim)).any(axis=1)
+        if not dropped.any():
+            break
+        faces = _whole(faces[~dropped])
+    starts = _rim(faces, len(points))[:, 0]
+    if turned.any() or len(np.unique(starts)) < len(starts):
+        return None
+    return placed, faces, track
+
+
+def _told(draft: Draft, placed: Reals, faces: Indices, track: Tree, edges: int) -> Draft:
+    """The draft of these points (v, 3) and triangles, with a note of how far from the curves the edge was at
+    most where it is smooth now."""
+    moved = (placed != draft.points).any(axis=1)
+    used = np.zeros(len(moved), dtype=bool)
+    used[faces] = True
+    most = float(track.nearest(draft.points[moved | ~used])[2].max())
+    told = how_many(edges, "edge was toothed and was smoothed", "edges were toothed and were smoothed")
+    given = None if draft.normals is None else np.where(moved[:, None], 0.0, draft.normals)[used]
+    return replace(
+        draft,
+        points=placed[used],
+        triangles=(np.cumsum(used) - 1)[faces],
+        normals=given,
+        notes=(*draft.notes, f"{told}, by {most:.2g} m at most"),
+    )
+
+
+def _without_spikes(faces: Indices, count: int) -> Indices:
+    """The triangles without those of which two sides or more lie on the edge, and without what then hangs on
+    by a vertex alone; of `count` vertices."""
+    faces = _whole(faces[_on_rim(faces, count) < 2])
+    while True:
+        starts = _rim(faces, count)[:, 0]
+        met = np.flatnonzero(np.bincount(starts, minlength=count) > 1)
+        if not len(met):
+            return faces
+        faces = _whole(faces[~np.isin(faces, met).any(axis=1)])
+
+
+def toothed(points: Reals, loop: Indices) -> float | None:
+    """The median side, m, of an edge, a closed `loop` of vertices (n,), that is toothed by an element; None
+    where it isn't."""
+    at = _teeth(points[loop])
+    side = float(np.median(_sides(points[loop])))
+    narrow = float(np.sort(np.ptp(points, axis=0))[1])
+    if len(loop) < _FEWEST or len(at) < _TEETH or side > _MEANT * narrow:
+        return None
+    return side
+
+
+def is_ragged(points: Reals, loop: Indices) -> bool:
+    """Whether an edge, a closed `loop` of vertices (n,), is toothed by an element, or turns sharply at half
+    of its vertices or more, whatever its sides."""
+    sharp = len(loop) >= _FEWEST and np.median(_turn(points[loop], 1)) > _SHARP_TURN
+    return bool(sharp) or toothed(points, loop) is not None
+
+
+def _sides(corners: Reals) -> Reals:
+    """Lengths (n,), m, from each corner of a closed curve (n, 3) to the next."""
+    return np.asarray(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1))
+
+
+def _teeth(corners: Reals) -> Indices:
+    """The places (t, 2), first and last corner, of the teeth of a closed curve (n, 3)."""
+    side = _sides(corners)
+    along = (np.roll(corners, -1, axis=0) - corners) / np.maximum(side, 1e-300)[:, None]
+    before = np.roll(along, 1, axis=0)
+    sharp = np.flatnonzero(_turn(corners, 1) > _SHARP_TURN)
+    axis = np.cross(before, along)[sharp]
+    arc = np.concatenate([[0.0], np.cumsum(side)])
+    apart = (np.roll(arc[sharp], -1) - arc[sharp]) % arc[-1]
+    back = np.sum(axis * np.roll(axis, -1, axis=0), axis=1) < 0.0
+    is_tooth = back & (apart <= _LONG * np.median(side))
+    return np.column_stack([sharp, np.roll(sharp, -1)])[is_tooth]
+
+
+def _curve(corners: Reals, side: float) -> Reals:
+    """The places (n, 3) on the smooth curve for the corners of a toothed edge with this median `side`, m."""
+    count, middle = len(corners), corners.mean(axis=0)
+    corners = corners - middle  # far from the origin rounding would bend it
+    reach = _WAVES * np.sqrt(count)  # the curve's waves, in corners
+    at = np.zeros(count, dtype=bool)
+    at[_teeth(corners)] = True
+    away = cKDTree(np.flatnonzero(at)[:, None], boxsize=[count]).query(np.arange(count)[:, None])[0]
+    free = away <= 0.5 * reach
+    weight = np.where(free, 1.0, _FIXED)
+    stiffness = (reach / (2.0 * np.pi)) ** 4
+    kept = _meant(corners, weight, stiffness, round(0.25 * reach))
+    for _ in range(_TIGHTENINGS):
+        placed, _ = _bent(corners, weight, stiffness, kept)
+        off = np.linalg.norm(placed - corners, axis=1) / side
+        if off.max() <= 1.0:
+            break
+        weight *= np.maximum(off, 1.0)
+    return middle + np.where(free[:, None], placed, corners)
+
+
+def _bent(corners: Reals, weight: Reals, stiffness: float, kept: Indices) -> tuple[Reals, float]:
+    """The curve (n, 3) that lies near the `corners` (n, 3) by their `weight` (n,) and bends little by its
+    `stiffness`, but at the corners that are `kept` (c,) as freely as it likes; and what it comes to."""
+    count = len(corners)
+    ring = sp.eye_array(count, k=1) + sp.eye_array(count, k=1 - count)
+    bend = sp.csr_array(2.0 * sp.eye_array(count) - ring - ring.T)[np.delete(np.arange(count), kept)]
+    placed = spsolve(
+        sp.csc_array(sp.diags_array(weight) + stiffness * (bend.T @ bend)), weight[:, None] * corners
+    )
+    cost = np.sum(weight[:, None] * (placed - corners) ** 2) + stiffness * np.sum((bend @ placed) ** 2)
+    return placed, float(cost)
+
+
+def _meant(corners: Reals, weight: Reals, stiffness: float, half: int) -> Indices:
+    """The corners (c,) of a toothed edge that are no teeth: where the curve turns sharply within `half` of
+    its corners on either side, and has a sharp corner once it may."""
+    count = len(corners)
+    placed, _ = _bent(corners, weight, stiffness, np.zeros(0, dtype=np.int64))
+    turn = _turn(placed, half)
+    kept, seen = list[int](), list[int]()
+    for place in np.argsort(-turn, kind="stable"):
+        apart = [min((place - other) % count, (other - place) % count) for other in seen]
+        if turn[place] <= _SHARP_TURN or min(apart, default=count) <= 2 * half:
+            continue
+        seen.append(int(place))
+        tried = [(place + shift) % count for shift in range(-half, half + 1)]
+        found = [_bent(corners, weight, stiffness, np.array([*kept, each])) for each in tried]
+        best = min(range(len(tried)), key=lambda k: found[k][1])
+        if _turn(found[best][0], 1)[tried[best]] > _CORNER:
+            kept.append(tried[best])
+    return np.array(kept, dtype=np.int64)
+
+
+def _turn(corners: Reals, half: int) -> Reals:
+    """By how much (n,), rad, a closed curve turns between the chords over `half` of its corners (n, 3) before
+    and after each."""
+    before = corners - np.roll(corners, half, axis=0)
+    after = np.roll(corners, -half, axis=0) - corners
+    lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    return np.asarray(
+        np.arccos(np.clip(np.sum(before * after, axis=1) / np.maximum(lengths, 1e-300), -1.0, 1.0))
+    )
+
+
+def _onto(points: Reals, normals: Reals, places: Reals) -> Reals:
+    """The `places` (k, 3) near a surface's edge, put onto it, or onto what continues it, along its normal: by
+    the quadratic height function over the tangent plane that fits the vertices around best."""
+    near = cKDTree(points).query(places, k=min(_AROUND, len(points)))[1]
+    result = np.empty_like(places)
+    for k, (place, around) in enumerate(zip(places, near, strict=True)):
+        normal = normals[around].sum(axis=0)
+        normal /= np.linalg.norm(normal)
+        across = np.linalg.svd(normal[None])[2][1:]
+        offset = points[around] - place
+        u, v = (offset @ across.T).T
+        columns = np.column_stack([np.ones(len(u)), u, v, u * u, u * v, v * v])
+        height = np.linalg.lstsq(columns, offset @ normal, rcond=None)[0][0]
+        result[k] = place + height * normal
+    return result
+
+
+def _rim(faces: Indices, count: int) -> Indices:
+    """The directed sides (e, 2) that one triangle alone has; of `count` vertices."""
+    at = np.argwhere(across_edges(faces, count) < 0)
+    return np.column_stack([faces[at[:, 0], (at[:, 1] + k) % 3] for k in (0, 1)])
+
+
+def _on_rim(faces: Indices, count: int) -> Indices:
+    """How many sides (t,) of each triangle no other has; of `count` vertices."""
+    return np.asarray((across_edges(faces, count) < 0).sum(axis=1))
+
+
+def _poor(before: Reals, after: Reals, faces: Indices, thin: float) -> tuple[Flags, Flags]:
+    """Which triangles (t,) turn over, and which become lower than `thin`, m."""
+    old, new = (np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]) for at in (before[faces], after[faces]))
+    corner = after[faces]
+    longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
+    return np.sum(old * new, axis=1) <= 0.0, np.linalg.norm(new, axis=1) < thin * longest
+
+
+def _whole(faces: Indices) -> Indices:
+    """The triangles of the largest piece that hangs together by sides."""
+    first, second, _ = shared_edges(faces)
+    links = sp.csr_array((np.ones(len(first)), (first, second)), shape=(len(faces), len(faces)))
+    label = connected_components(links, directed=False)[1]
+    return faces[label == np.argmax(np.bincount(label))]
