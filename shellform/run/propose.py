@@ -120,6 +120,8 @@ def _read(asked: _Asked, file: Path, options: Mapping[str, Any]) -> _Ready:
     ground."""
     told: tuple[str, ...] = ()
     surface = surface_of(surface_entry(file, options), allow_scripts=asked.allow_scripts)
+    for mended in surface.mended:
+        asked.report(Event("surface", mended, Kind.NOTE))
     origin = distant_origin(surface, FAR)
     if origin is not None:
         surface, earlier = counted_from(surface, origin), options.get("origin") or (0.0, 0.0, 0.0)
