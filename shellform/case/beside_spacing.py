@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from shellform.case.entries import CableEntry, JointEntry, LoadEntry, NetEntry, OptimiseEntry, OwnRodEntry
+from shellform.case.entries import CableEntry, JointEntry, NetEntry, OptimiseEntry, OwnRodEntry
 from shellform.case.safety_entries import TolerancesEntry
 from shellform.errors import InputError
-from shellform.gridshell.loads import as_concrete
 from shellform.gridshell.possible_rods import refuse_thick
 from shellform.gridshell.tolerances import LENGTHS as DEVIATIONS
-from shellform.quantities import LENGTHS, MILLIMETRES, MILLINEWTONS, if_other_unit
+from shellform.quantities import LENGTHS, MILLIMETRES, if_other_unit
 
-_HEAVIEST, _SHELL = 1e5, 1200.0  # N/m²: four metres of concrete; 50 mm
 _LONGEST = 2.0  # spacings, of a cell's diagonal
 _OFF = 0.25  # spacings: what lies so far off as a standard deviation has no place in the grid
 
@@ -54,19 +52,6 @@ def refuse_others(
                 1e-4 * spacing,
                 share * longest,
             )
-
-
-def refuse_load(load: LoadEntry, net: NetEntry) -> None:
-    """Raises InputError for wet concrete heavier than any is."""
-    area = load.every * net.spacing * (net.spacing_v or net.spacing)
-    if load.force > _HEAVIEST * area:
-        raise InputError(
-            f"is {as_concrete(load.force / area)}",
-            where="load.force",
-            value=load.force,
-            remedy=f"Give newtons a loaded crossing, such as {_SHELL * area:.2g} here."
-            + if_other_unit(load.force, MILLINEWTONS, 0.1 * _SHELL * area, 5.0 * _SHELL * area),
-        )
 
 
 def _refuse(where: str, value: float, what: str, low: float, high: float) -> None:

@@ -24,7 +24,16 @@ from shellform.case.entries import (
 from shellform.case.sized import STRETCHED
 from shellform.errors import InputError
 from shellform.gridshell.loads import CONCRETE, GRAVITY, as_concrete, refuse_bulk
-from shellform.quantities import AREA_MASS, DENSITIES, DENSITY, FORCES, LENGTHS, MASSES, if_other_unit
+from shellform.quantities import (
+    AREA_MASS,
+    DENSITIES,
+    DENSITY,
+    FORCES,
+    LENGTHS,
+    MASSES,
+    MILLINEWTONS,
+    if_other_unit,
+)
 from shellform.surface.shape.target import Surface
 
 _THICK = 0.04  # of the larger side: vaults of stone are as thick
@@ -72,7 +81,8 @@ def doubts(case: Case, surface: Surface) -> tuple[str, ...]:
         if isinstance(entry, LoadEntry | PointsEntry):
             weight = entry.force / (entry.every * area)
             if (weight < _LIGHT and not poured) or weight > _HEAVY:
-                meant = if_other_unit(entry.force, FORCES, *(each * entry.every * area for each in _LIKELY))
+                likely = (each * entry.every * area for each in _LIKELY)
+                meant = if_other_unit(entry.force, FORCES | MILLINEWTONS, *likely)
                 told.append(_doubt(f"{where}.force", f"{entry.force:g} N", as_concrete(weight), meant))
         if isinstance(entry, ConcreteEntry):
             if entry.thickness > _THICK * side:

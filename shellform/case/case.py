@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 import shellform
-from shellform.case.beside_spacing import refuse_load, refuse_others, refuse_rods
+from shellform.case.beside_spacing import refuse_others, refuse_rods
 from shellform.case.build_rod import given_section
 from shellform.case.edge_entries import EdgesEntry
 from shellform.case.entries import (
@@ -93,8 +93,6 @@ class Case(Entry):
     def _fitting(self) -> Case:
         if isinstance(self.rod, OwnRodEntry):
             refuse_rods(self.rod, self.net)
-        if isinstance(self.load, LoadEntry):
-            refuse_load(self.load, self.net)
         refuse_others(self.net, self.joint, self.cable, self.tolerances, self.optimise)
         return self
 
