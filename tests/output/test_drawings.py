@@ -471,7 +471,7 @@ def test_supports_that_stand_too_near_for_their_shoes_are_named(built):
         assert f"S{a} and S{b}" in note
         assert f"S{b}" in table.column("clashes with")[a].split(", ")
         assert f"S{a} and S{b}, {1e3 * apart[a, b]:.1f} mm" in " ".join(table.notes)
-    thin = replace(built, design=replace(built.design, radius=1e-6))
+    thin = replace(built, design=replace(built.design, radius=1e-5))
     assert not schedules.clashing_supports(thin)
     assert "Nearer" not in " ".join(setting_out.support_plan(thin).notes)
     assert "clash: none." in " ".join(schedules.supports(thin).notes)

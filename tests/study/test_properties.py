@@ -97,11 +97,12 @@ def test_net_files_give_back_every_number_and_word(tmp_path_factory, net):
 def test_case_files_give_back_every_number(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("case")
     case = load_case(study_file(folder, "").with_name("dome.toml"))
+    stiffness = data.draw(above)
     drawn = {
         "net": {"spacing": data.draw(st.floats(0.02, 10.0)), "angle": data.draw(st.floats(-90.0, 90.0))},
-        "cable": {"stiffness": data.draw(above), "force_max": data.draw(above)},
+        "cable": {"stiffness": stiffness, "force_max": stiffness * data.draw(st.floats(1e-3, 1.0))},
         "load": {"force": data.draw(above)},
-        "rod": {"radius": data.draw(st.floats(1e-5, 1.0))},
+        "rod": {"radius": data.draw(st.floats(1e-5, 0.009))},
     }
     changed = case.model_copy(
         update={name: getattr(case, name).model_copy(update=values) for name, values in drawn.items()}
