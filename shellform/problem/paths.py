@@ -10,8 +10,8 @@ import numpy as np
 from shellform.arrays import Flags, Reals, reals
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.structure.elements.state import State
-from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
+from shellform.structure.solve.assembly import Assembly, on_their_own
 from shellform.structure.solve.drive import forces
 from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.loading import Loaded
@@ -37,20 +37,13 @@ def follow(
     none = np.zeros((shell.node_count, 6))
     first = assemble(shell.network(design))
     unloaded = find_equilibrium(first, shell.target, none)
-    idle = [first]  # assemblies that no case is using: each keeps one factor, and the cases go side by side
 
-    def loaded(load: Reals) -> Loaded:
-        if not load.any():
-            return Loaded(unloaded, 1.0, unloaded.factorisations)
-        try:
-            own = idle.pop()
-        except IndexError:
-            own = first.beside()
-        found = settle(own, unloaded.state, forces(load), stay=stay)
-        idle.append(own)
-        return found
+    def loaded(own: Assembly, load: Reals) -> Loaded:
+        return settle(own, unloaded.state, forces(load), stay=stay)
 
-    return dict(zip(given, side_by_side(loaded, list(given.values())), strict=True))
+    followed = {name: load for name, load in given.items() if load.any()}
+    found = dict(zip(followed, on_their_own(first, loaded, list(followed.values())), strict=True))
+    return {name: found.get(name, Loaded(unloaded, 1.0, unloaded.factorisations)) for name in given}
 
 
 def in_tension(shell: Gridshell, design: Design, state: State) -> Flags:

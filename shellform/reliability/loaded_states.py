@@ -14,13 +14,13 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.tolerances import span_of
 from shellform.reliability.branch import Branch
-from shellform.reliability.members import members_of
 from shellform.reliability.perfect import TO_ITS_END
 from shellform.reliability.safety import paths
 from shellform.structure.elements.state import State
-from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
+from shellform.structure.solve.assembly import Assembly, on_their_own
 from shellform.structure.solve.equilibrium import TOLERANCE, find_equilibrium
 from shellform.structure.solve.loading import SMALLEST
 
@@ -36,15 +36,10 @@ def loaded_states(
     NotConverged where there is no unloaded state."""
     first = assemble(shell.network(design))
     unloaded = find_equilibrium(first, shell.target, np.zeros((shell.node_count, 6)))
-    span, idle = members_of(shell).span, [first]
 
-    def along(path: tuple[str, Mapping[str, float]]) -> tuple[dict[str, State] | None, int]:
+    def along(own: Assembly, path: tuple[str, Mapping[str, float]]) -> tuple[dict[str, State] | None, int]:
         largest, shares = path
-        try:
-            own = idle.pop()
-        except IndexError:
-            own = first.beside()
-        branch, load, found = Branch(own, loads[largest], span), loads[largest], dict[str, State]()
+        branch, load, found = Branch(own, loads[largest], span_of(shell)), loads[largest], dict[str, State]()
 
         def reached(factor: float, state: State) -> None:
             for name, share in shares.items():
@@ -57,12 +52,11 @@ def loaded_states(
         if here is not None:
             stops = tuple(shares.values())
             branch.along(here, 0.0, 1.0, TO_ITS_END, SMALLEST, reached, stops=stops, heeding=True)
-        idle.append(own)
         return found if len(found) == len(shares) else None, branch.spent
 
     states = {name: unloaded.state for name, load in loads.items() if not load.any()}
     spent = unloaded.factorisations
-    for found, own in side_by_side(along, list(paths(loads).items())):
+    for found, own in on_their_own(first, along, list(paths(loads).items())):
         spent += own
         if found is None:
             return None, spent

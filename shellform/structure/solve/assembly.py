@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.parts import Part
 from shellform.structure.elements.state import State
-from shellform.structure.elements.threads import share
+from shellform.structure.elements.threads import Item, Result, share, side_by_side
 from shellform.structure.solve.chords import ChordKeeper
 from shellform.structure.solve.factorisation import Factor, Symmetric
 from shellform.work_clock import Work, counts_as
@@ -197,6 +197,25 @@ class Assembly:
         values = self.evaluate(state).tangent
         assert values is not None
         return self.matrix.factor(values)
+
+
+def on_their_own(
+    first: Assembly, work: Callable[[Assembly, Item], Result], items: Sequence[Item]
+) -> list[Result]:
+    """`work` on every item, side by side on the cores, each with an assembly that no other is using, since
+    one keeps one factor: the `first` or one beside it; results in order."""
+    idle = [first]
+
+    def alone(item: Item) -> Result:
+        try:
+            own = idle.pop()
+        except IndexError:
+            own = first.beside()
+        found = work(own, item)
+        idle.append(own)
+        return found
+
+    return side_by_side(alone, items)
 
 
 def _arms(count: int, beams: Sequence[Beams]) -> Reals:
