@@ -141,15 +141,21 @@ def _stiffened(
             break
     if heavier is not None:
         yield heavier
-    times, seen = design.tried.off / far, [parts.choice]
-    for aimed in (times, math.sqrt(times)):
-        choice = stiffer(design, aimed)
-        if choice is None or choice in seen:
-            continue
-        seen.append(choice)
-        stiffened = replace(parts, choice=choice, edge=edge_choices(choice)[stage])
+    for stiffened in with_stiffer_rods(design, stiffer, design.tried.off / far):
         if off(stiffened) <= _NEARER * design.tried.off:
             yield stiffened
+
+
+def with_stiffer_rods(design: FirstDesign, stiffer: Stiffer, times: float) -> Iterator[FirstParts]:
+    """The parts with rods so many `times` as stiff, on edge beams as much stiffer than these as before; then
+    with rods half the way there."""
+    parts, seen = design.parts, [design.parts.choice]
+    stage = edge_choices(parts.choice).index(parts.edge)
+    for aimed in (times, math.sqrt(times)):
+        choice = stiffer(design, aimed)
+        if choice is not None and choice not in seen:
+            seen.append(choice)
+            yield replace(parts, choice=choice, edge=edge_choices(choice)[stage])
 
 
 def with_room(design: FirstDesign, surface: Surface, say: Say) -> FirstDesign:

@@ -9,12 +9,11 @@ structures by which `design` judges the shape.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 
 from shellform.run.first_edges import edge_choices
-from shellform.run.first_finish import Say, Stiffer, WithParts
+from shellform.run.first_finish import Say, Stiffer, WithParts, with_stiffer_rods
 from shellform.run.first_net import Allowance
 from shellform.run.first_trial import FirstDesign, FirstParts, millimetres, straying
 from shellform.run.sizes import may_stray
@@ -76,13 +75,8 @@ def steadier(
 def _stiffened(design: FirstDesign, stiffer: Stiffer, times: float) -> Iterator[FirstParts]:
     """The next heavier edge beams; then rods so many `times` as stiff, on edge beams as much stiffer than
     these as before; then rods half the way there."""
-    parts, seen = design.parts, [design.parts.choice]
-    edges = edge_choices(parts.choice)
+    parts, edges = design.parts, edge_choices(design.parts.choice)
     stage = edges.index(parts.edge)
     if design.placed.net.edges and stage + 1 < len(edges):
         yield replace(parts, edge=edges[stage + 1])
-    for aimed in (times, math.sqrt(times)):
-        choice = stiffer(design, aimed)
-        if choice is not None and choice not in seen:
-            seen.append(choice)
-            yield replace(parts, choice=choice, edge=edge_choices(choice)[stage])
+    yield from with_stiffer_rods(design, stiffer, times)

@@ -14,6 +14,7 @@ import numpy as np
 
 from shellform.arrays import Reals, Record
 from shellform.case.build_problem import edge_utilisation
+from shellform.case.safety_entries import SafetyEntry
 from shellform.errors import NotConverged
 from shellform.gridshell.edge_beams import EdgeBeam, weight
 from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace
@@ -25,6 +26,7 @@ from shellform.problem.paths import deviations
 from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
 from shellform.run.first_edges import EdgeChoice
+from shellform.run.sampling import SHAPES
 from shellform.run.sizes import LEAST_PRESTRAIN, STRAINED, Placed, RodChoice, Rope, thicker
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -36,8 +38,7 @@ ELEMENTS = 2  # a segment
 NEEDED = 1.5  # times the design load, which the perfect structure bears: drawn ones fall earlier
 ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path the design load then is
 DRAWN, SEED, ENLARGED = 40, 1, 1.25  # structures, their seed, and how much larger their errors are
-LOOKED_AT = 20  # structures of which the shape is looked at
-JUDGED = 0  # the seed under which a case has them
+_SEED = SafetyEntry.model_validate({}).seed  # under which a case that says nothing else is judged
 STRESSED = 0.95  # of the strength, at the most, under the additional load
 PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond it takes no cables away
 _RELIEVED = 1.5  # with which power of the force in excess a section has to grow: stiffer strands bear more of the load
@@ -213,7 +214,7 @@ def straying(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
     the design load, m."""
     shell, load = _shell(net, surface, parts, thickness)
     nominal = perfect(shell, shell.design(rest_ratio=parts.rest_ratio), load)
-    made = Workshop(nominal).load_numbers(default_tolerances(shell), seed=JUDGED, numbers=range(LOOKED_AT))
+    made = Workshop(nominal).load_numbers(default_tolerances(shell), seed=_SEED, numbers=range(SHAPES))
     return max((each.far for each in made if each.stands), default=0.0)
 
 
