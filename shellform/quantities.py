@@ -18,6 +18,7 @@ from shellform.errors import InputError, require_number
 MILLIMETRES: Final = {"mm": 1e-3}
 LENGTHS: Final = {"mm": 1e-3, "cm": 1e-2}
 STRESSES: Final = {"MPa": 1e6, "GPa": 1e9, "kPa": 1e3}
+MODULI: Final = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3}
 DENSITIES: Final = {"t/m³": 1e3, "kN/m³": 1e3 / 9.81, "N/m³": 1.0 / 9.81, "g/m³": 1e-3}
 FORCES: Final = {"kN": 1e3}
 MILLINEWTONS: Final = {"mN": 1e-3}
@@ -131,7 +132,7 @@ YOUNG: Final = Quantity(
     "pascals, such as 40e9",
     (2.5e5, 1e14),
     (1e9, 1e12),
-    {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3},
+    MODULI,
 )
 SHEAR: Final = Quantity(
     "every rod's shear modulus is",
@@ -139,7 +140,7 @@ SHEAR: Final = Quantity(
     "pascals, such as 4.5e9",
     (1e5, 1e14),
     (3e7, 5e11),
-    {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3},
+    MODULI,
 )
 STRENGTH: Final = Quantity(
     "every rod's strength is",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -77,7 +78,7 @@ def doubts(case: Case, surface: Surface) -> tuple[str, ...]:
         for where, length in _allowed(case)
         if length > side
     ]
-    for where, entry in [("load", case.load), *((f"part.{name}", part) for name, part in case.part.items())]:
+    for where, entry in _loads(case):
         if isinstance(entry, LoadEntry | PointsEntry):
             weight = entry.force / (entry.every * area)
             if (weight < _LIGHT and not poured) or weight > _HEAVY:
@@ -146,6 +147,13 @@ def _allowed(case: Case) -> Iterator[tuple[str, float]]:
             yield where, length
 
 
+def _loads(case: Case) -> Iterator[tuple[str, Any]]:
+    """The load, or load cases, and all parts of loads, by the entries."""
+    yield "load", case.load
+    for name, part in case.part.items():
+        yield f"part.{name}", part
+
+
 def _curves(case: Case) -> Iterator[tuple[str, Sequence[tuple[float, float]]]]:
     """The curves in plan, by the entries."""
     if case.net.outline:
@@ -155,8 +163,7 @@ def _curves(case: Case) -> Iterator[tuple[str, Sequence[tuple[float, float]]]]:
     for k, stretch in enumerate(case.edges.stretch):
         if stretch.curve is not None:
             yield f"edges.stretch[{k}].curve", stretch.curve
-    entries = [("load", case.load), *((f"part.{name}", part) for name, part in case.part.items())]
-    for where, entry in entries:
+    for where, entry in _loads(case):
         for name in ("openings", "inside"):
             for k, polygon in enumerate(getattr(entry, name, ())):
                 if polygon:

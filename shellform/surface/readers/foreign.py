@@ -152,42 +152,20 @@ def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
 
         return cad.read_script(file, size=settings["size"], dimensions=settings["dimensions"])
     choice = Choice(settings["layer"], settings["name"])
+    meshed: dict[str, Any] = {name: settings[name] for name in ("unit", "size", "up", "face")}
+    meshed["before_mesh"] = allow_mesh
     if kind == "compas surface":
         from shellform.surface.readers import compas_surfaces
 
-        return compas_surfaces.read_compas_surfaces(
-            file,
-            choice,
-            unit=settings["unit"],
-            size=settings["size"],
-            up=settings["up"],
-            face=settings["face"],
-            before_mesh=allow_mesh,
-        )
+        return compas_surfaces.read_compas_surfaces(file, choice, **meshed)
     if _LIBRARIES[kind] == "gmsh":
         from shellform.surface import cad
 
-        return cad.read_cad(
-            file,
-            kind,
-            unit=settings["unit"],
-            size=settings["size"],
-            up=settings["up"],
-            face=settings["face"],
-            before_mesh=allow_mesh,
-        )
+        return cad.read_cad(file, kind, **meshed)
     if kind == "3dm":
         from shellform.surface.readers import rhino
 
-        return rhino.read_rhino(
-            file,
-            choice,
-            unit=settings["unit"],
-            size=settings["size"],
-            up=settings["up"],
-            face=settings["face"],
-            before_mesh=allow_mesh,
-        )
+        return rhino.read_rhino(file, choice, **meshed)
     if kind == "ply":
         from shellform.surface.readers import ply
 
