@@ -28,9 +28,8 @@ from shellform.net.refusal import NoNet, Reason
 _ITERATIONS = 30  # of Newton towards one point, at the most
 _CLOSE = 1e-10  # of the spacing
 _PARALLEL = 0.05  # sine of the angle between two rods, below which they run in one direction
-_LITTLE = (
-    0.25 * math.pi
-)  # of the π/2 by which the rods of a quadrant between straight guides come to be parallel
+# Half of what makes the rods of a quadrant between straight guides come to be parallel, π/2.
+_LITTLE = 0.25 * math.pi
 _MOST = 200_000  # crossings
 _MOST_STEPS = 4000  # of one guide
 
