@@ -337,8 +337,8 @@ class _Search:
     def _with_parts(
         self, placed: Placed, parts: FirstParts, spacing: float, thickness: float, *, climbs: bool = True
     ) -> FirstDesign | Obstacle:
-        """The design, where it stands with the gap that follows its rods too; a net that can't be pulled with
-        that `climbs` the ladder, or doesn't."""
+        """The design, where it stands with the gap that follows its rods too, and the net that is pulled with
+        that bends them no more than they bear; one that can't be pulled `climbs` the ladder, or doesn't."""
         parts, tried, failure = self._solved(placed, parts, spacing, thickness)
         choice = parts.choice
         what = f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete"
@@ -350,6 +350,8 @@ class _Search:
                 placed = with_gap(self.surface, placed, spacing, gap, self.edges, self._say, climbs=climbs)
             except (NoNet, Stalled) as error:
                 return self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
+            if (bent := too_curved(placed, [choice], spacing, thickness)).why is Why.CURVATURE:
+                return self._keep(bent)
             parts, tried, failure = self._solved(placed, parts, spacing, thickness)
         self.say(f"{what}: {came_to(placed, tried)}")
         if failure is not None:

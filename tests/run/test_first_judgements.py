@@ -16,6 +16,7 @@ from shellform.run.first_trial import Followed
 from shellform.run.next_trial import bears_most
 from shellform.run.sizes import DesignWish, Placed
 from shellform.run.unbuildable import Obstacle, Why
+from tests.run.test_unbuildable import net_bent, rods
 
 Choice = namedtuple("Choice", "section")
 PARTS = SimpleNamespace(easier=lambda tried, most: None, stronger=lambda tried: None, choice=None)
@@ -62,6 +63,25 @@ def test_a_design_fails_by_load_then_by_its_rods_edge_beams_and_cables(found, wh
         return
     assert (failure.why, failure.stress, failure.factor) == (why, stress, found[0])
     assert failure.where[0] == (2.0 if why is Why.STRENGTH else 1.0)
+
+
+def test_rods_that_break_on_the_net_pulled_with_their_gap_are_a_failure_of_that_design_alone(monkeypatch):
+    """A net may have a kink with one gap that it hasn't with another: the search goes on."""
+    before, kinked = (
+        SimpleNamespace(net=SimpleNamespace(**vars(net_bent(bent)), edges=())) for bent in (0.1, 4.5)
+    )
+    before.net.grid.gap = 0.05
+    monkeypatch.setattr(first_design, "with_gap", lambda *_, **how: kinked)
+    parts = SimpleNamespace(choice=rods(radius=0.016), joint=SimpleNamespace(gap=0.06))
+    kept = []
+    search = SimpleNamespace(
+        surface=None, edges=None, _say=None, _solved=lambda *_: (parts, "stood", None),
+        _keep=lambda failure: kept.append(failure) or failure,
+    )  # fmt: skip
+    found = _Search._with_parts(search, before, parts, 1.0, 0.013)
+    assert kept == [found]
+    assert (found.why, found.placed, found.choice) == (Why.CURVATURE, kinked, parts.choice)
+    assert found.stress == pytest.approx(40e9 * 0.016 * np.hypot(4.5, 0.45) / 255e6)  # out of plane and in it
 
 
 @pytest.mark.parametrize(
