@@ -9,7 +9,8 @@ The likeliest test files of a fault are those of the same room that name the mod
 all of the room. They are run once without any fault, in one process, which tells what fails anyhow and is
 left out, and which of the package's functions each test calls. Then the process is forked for each fault: the
 child puts the faulty function in the sound one's place and runs the tests that call it, those that do so
-themselves before those whose fixtures do, and the quickest first. A fault that no test notices is listed with
+themselves before those whose fixtures do, and the quickest first. Tests that start processes of their own
+can't be run so and are left out, by their names. A fault that no test notices is listed with
 its line; what nobody could notice stands with its reason in scripts/mutants.toml. Status 1 where fewer than
 90 % of the others are caught.
 
@@ -42,10 +43,13 @@ import time
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import CodeType, FrameType, FunctionType
 from typing import TextIO
+from unittest.mock import patch
 
 import pytest
 
@@ -281,6 +285,21 @@ def _lines(code: CodeType) -> tuple[int, int]:
     return code.co_firstlineno, max([*own, *inner], default=code.co_firstlineno)
 
 
+@contextmanager
+def _telling_starts() -> Iterator[list[BaseProcess]]:
+    """The processes that are started meanwhile by multiprocessing, as a study's workers are. The threads that
+    wait for these aren't forked, so that a forked test would wait for ever."""
+    started: list[BaseProcess] = []
+    start = BaseProcess.start
+
+    def told(process: BaseProcess) -> None:
+        started.append(process)
+        start(process)
+
+    with patch.object(BaseProcess, "start", told):
+        yield started
+
+
 class Planter:
     """A plug-in for pytest that runs the tests as they are, and then on each of the `faults` in a process
     forked from there. `rows` are what becomes of each, told to `told`; `rest` those that couldn't be
@@ -334,13 +353,17 @@ class Planter:
         items = [*session.items]
         for k, item in enumerate(items):
             began, since, self.failed = time.process_time(), time.monotonic(), ""
-            sys.settrace(self._trace)
-            self._run(item, items[(k + 1) % len(items)])
-            sys.settrace(None)
+            with _telling_starts() as starts:
+                sys.settrace(self._trace)
+                self._run(item, items[(k + 1) % len(items)])
+                sys.settrace(None)
             self._seconds[item.nodeid] = time.process_time() - began
             self._waited[item.nodeid] = time.monotonic() - since
             if self.failed:
                 print(f"left out: {self.failed} fails without any fault", file=self.told, flush=True)
+            if starts:
+                print(f"left out: {item.nodeid} starts processes", file=self.told, flush=True)
+            if self.failed or starts:
                 self._itself.pop(item.nodeid, None)
         spent = sum(self._seconds.values())
         print(f"{len(items)} tests, {spent:.0f} s of processor time", file=self.told, flush=True)
