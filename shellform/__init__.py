@@ -10,6 +10,7 @@ loads no large library.
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 
 from shellform import lazy
 
@@ -17,16 +18,17 @@ __version__ = "0.4.0"
 __getattr__, __dir__ = lazy.public(__name__)
 
 _SHOWN = {
-    ("shellform.net.net", "Net"): "net",
-    ("shellform.gridshell.gridshell", "Gridshell"): "gridshell",
-    ("shellform.optimiser.optimum", "Optimum"): "optimum",
+    ("shellform.net.net", "Net"): "shellform.output.notebook.net",
+    ("shellform.gridshell.gridshell", "Gridshell"): "shellform.output.notebook.gridshell",
+    ("shellform.optimiser.optimum", "Optimum"): "shellform.output.notebook.optimum",
+    ("shellform.run.folder", "Run"): "shellform.run.displayed.run",
 }
 _KINDS = {"image/png": "png", "text/html": "html"}
 
 
 def load_ipython_extension(ipython):  # typed in the stub
-    """Nets, gridshells and optima show their picture, and where HTML is shown a view to be turned and picked
-    in (`%load_ext shellform`; done by itself where IPython runs).
+    """Nets, gridshells, optima and runs show their picture, and where HTML is shown a view to be turned and
+    picked in (`%load_ext shellform`; done by itself where IPython runs).
     """
     for kind, ending in _KINDS.items():
         formatter = ipython.display_formatter.formatters[kind]
@@ -34,11 +36,11 @@ def load_ipython_extension(ipython):  # typed in the stub
             formatter.for_type_by_name(home, name, _drawer(f"{thing}_{ending}"))
 
 
-def _drawer(function):
-    def drawn(thing):
-        from shellform.output import notebook
+def _drawer(address):
+    home, function = address.rsplit(".", 1)
 
-        return getattr(notebook, function)(thing)
+    def drawn(thing):
+        return getattr(import_module(home), function)(thing)
 
     return drawn
 

@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from shellform.arrays import Reals
 from shellform.errors import InputError
-from shellform.gridshell.gridshell import Gridshell
+from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.net import Net
 from shellform.optimiser.optimum import Optimum
 from shellform.output.page.report import VIEW
@@ -27,6 +28,7 @@ from shellform.output.pictures.images import png_bytes
 from shellform.output.pictures.panel import Look, Panel
 from shellform.problem.paths import deviations
 from shellform.records.words import load_title, number
+from shellform.structure.elements.state import State
 
 _SIZE = (900, 560)  # pixels, of a picture
 _TALL = 760  # pixels, of the view's frame
@@ -54,15 +56,22 @@ def gridshell_png(shell: Gridshell) -> bytes:
 
 
 def optimum_png(optimum: Optimum) -> bytes:
-    """The design under each of its loads, coloured by the deviation from the target up to the largest one."""
-    shell, states = optimum.problem.shell, optimum.states
-    loads = {name: optimum.problem.loads.get(name) for name in states}
+    """The design under each of its loads, as `design_png` draws it."""
+    problem = optimum.problem
+    return design_png(problem.shell, optimum.design, optimum.states, problem.loads, optimum.status)
+
+
+def design_png(
+    shell: Gridshell, design: Design, states: Mapping[str, State], loads: Mapping[str, Reals], heading: str
+) -> bytes:
+    """A design in its states by load case, coloured by the deviation from the target up to the largest one;
+    `loads` (n, 6), N, of those that have some."""
     panels = [
-        maps.panel_of(shell, optimum.design, state, load=loads[name], title=f"load: {name}")
+        maps.panel_of(shell, design, state, load=loads.get(name), title=f"load: {name}")
         for name, state in states.items()
     ]
     largest = max(net_maps.limit_of(panel) for panel in panels)
-    return _png([panels], Look(limit=largest, size=_SMALL if len(panels) > 1 else _SIZE), optimum.status)
+    return _png([panels], Look(limit=largest, size=_SMALL if len(panels) > 1 else _SIZE), heading)
 
 
 def _png(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> bytes:
@@ -105,6 +114,11 @@ def optimum_html(optimum: Optimum) -> str:
         limit=max(largest, 1e-6),
         shown_first=first,
     )
+    return view_html(viewed)
+
+
+def view_html(viewed: ViewedShell) -> str:
+    """The page's view of designs."""
     return _framed(view_data(viewed), viewed)
 
 
