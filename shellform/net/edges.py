@@ -103,6 +103,7 @@ def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals 
     """
     ends, rims = ends_of(net, surface, outline)
     low = _low(surface, edges)
+    _refuse_missed(edges, rims)
     for rim in rims:
         _sort_out(rim, edges, low)
     builder = _Builder(net, rims)
@@ -151,6 +152,23 @@ def stretches_of(surface: Surface, edges: Edges = Edges()) -> tuple[Stretch, ...
         _sort_out(rim, edges, low)
         found += _stretches(rim)
     return tuple(found)
+
+
+def _refuse_missed(edges: Edges, rims: Sequence[Rim]) -> None:
+    """Raises InputError for a place by level, box or curve that no edge comes to: what it names would be left
+    out without a word."""
+    points = np.vstack([rim.points for rim in rims])
+    for number, place in enumerate(edges.places):
+        anywhere = place.height is None and place.box is None and place.curve is None
+        if anywhere or any(place.holds(rim.points, opening=rim.opening).any() for rim in rims):
+            continue
+        low, high = (", ".join(f"{each:.4g}" for each in end(points, axis=0)) for end in (np.min, np.max))
+        raise InputError(
+            f"holds no point of the surface's edges, which reach from ({low}) to ({high}) m",
+            where=f"edges.stretch[{number}]",
+            value=place.name or place.kind,
+            remedy="Give a place on these, in metres, wide enough to hold vertices of the mesh; or leave the stretch out.",
+        )
 
 
 def _low(surface: Surface, edges: Edges) -> float:

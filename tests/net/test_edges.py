@@ -35,6 +35,37 @@ def kinds(net):
     return sorted(each.kind for each in net.stretches)
 
 
+@pytest.mark.parametrize(
+    "place",
+    [
+        Place("wall", "north", height=(100.0, 200.0)),  # in millimetres
+        Place("wall", "north", box=[[5.0, -9, -9], [9, 9, 9]]),
+        Place("wall", "north", curve=[[0.0, 2.0], [0.4, 2.0]], within=0.01),
+        Place("wall", "north", box=[[0.3, -9, -9], [9, 9, 9]], opening=True),  # which there is none of
+    ],
+)
+def test_a_stretch_that_no_edge_comes_to_is_refused_by_its_number_and_told_where_edges_are(
+    vault_of_two_arches, place
+):
+    surface, net = vault_of_two_arches
+    before = Place("wall", "ends", box=[[0.3, -9, -9], [9, 9, 9]])
+    with pytest.raises(InputError, match=r"holds no point of the surface's edges.*reach from") as error:
+        stand(net, surface, Edges((before, place)))
+    assert (error.value.where, error.value.value) == ("edges.stretch[1]", "north")
+    rim = surface.vertices[surface.boundary[0]]
+    assert ", ".join(f"{each:.4g}" for each in rim.max(axis=0)) in str(error.value)
+
+
+def test_a_stretch_that_others_decide_before_it_and_one_of_openings_where_there_are_none_may_stand(
+    vault_of_two_arches,
+):
+    surface, net = vault_of_two_arches
+    first = Place("wall", "ends", box=[[0.3, -9, -9], [9, 9, 9]])
+    later = [Place("free", "later", box=[[0.3, -9, -9], [9, 9, 9]]), Place("pin", opening=True)]
+    found = stand(net, surface, Edges((first, *later)))
+    assert {each.name for each in found.stretches} == {"", "ends"}
+
+
 def test_a_net_on_the_ground_all_round_is_what_it_was(vault, net):
     found = stand(net, vault)
     assert found.grid is net.grid
