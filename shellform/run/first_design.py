@@ -13,6 +13,7 @@ Nothing is random but what is drawn under a fixed seed: the same surface gives t
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -25,7 +26,7 @@ from shellform.net.edges import Edges, stand
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_edges import HEAVY, EdgeChoice, edge_choices
 from shellform.run.first_finish import came_to, nearer, straighter, too_far, with_room
-from shellform.run.first_net import ANGLES, Allowance, bends_to, least_bent_net, with_gap
+from shellform.run.first_net import ANGLES, Allowance, least_bent_net, net_told, with_gap
 from shellform.run.first_steadier import steadier, strays, with_strays
 from shellform.run.first_trial import (
     DRAWN,
@@ -195,19 +196,19 @@ class _Search:
     def _on_net(self, spacing: float, thickness: float) -> FirstDesign | None:
         """The first section that stands on a net of that spacing; None where none does."""
         try:
-            placed = self._net(spacing, usual_gap(spacing))
+            nets = self._nets(spacing, usual_gap(spacing))
         except (NoNet, Stalled) as error:
             self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
             self.say(f"no net at {spacing:g} m: {error.what if isinstance(error, InputError) else error}")
             return None
-        for layers in self.layers:
+        for layers, placed in itertools.product(self.layers, nets):
             possible = choices(placed.net, spacing, self.wish.rod, layers)
             result = self._first_that_stands(placed, possible, spacing, thickness) if possible else None
             if result is not None:
                 return result
         if self.best is None:
-            self._keep(too_curved(placed, wished(self.wish.rod, self.layers[0]), spacing, thickness))
-        return self._on_heavier_edges(placed, spacing, thickness) if placed.net.edges else None
+            self._keep(too_curved(nets[-1], wished(self.wish.rod, self.layers[0]), spacing, thickness))
+        return self._on_heavier_edges(nets[-1], spacing, thickness) if nets[-1].net.edges else None
 
     def _on_heavier_edges(self, placed: Placed, spacing: float, thickness: float) -> FirstDesign | None:
         """The design on far heavier edge beams, without which no rods help where edges give way; None where
@@ -284,27 +285,22 @@ class _Search:
             raise refused(self.surface, nearest, self.wish, bears=result.thickness)
         return result
 
-    def _net(self, spacing: float, gap: float) -> Placed:
-        """The net that bends its rods least, among several angles and offsets. Raises NoNet or Stalled."""
+    def _nets(self, spacing: float, gap: float) -> list[Placed]:
+        """The net that bends its rods least, among several angles and offsets; before it, on a saddle, the
+        one across it, unless edge beams give way to its arches. Raises NoNet or Stalled."""
         angles: Sequence[float] = self.angles if self.wish.angle is None else (self.wish.angle,)
-        best, near = least_bent_net(
-            self.surface,
-            spacing,
-            gap,
-            angles,
-            self.say,
-            self.allowance,
-            shifted=angles is ANGLES,
-            tell=self._say,
-        )
-        self.angles, self.allowance.angle = near or self.angles, best.angle
-        placed = replace(best, net=stand(best.net, self.surface, self.edges))
-        self.say(
-            f"net at {best.angle:g}° and {spacing:g} m: {len(placed.net.grid.lattice)} crossings, "
-            f"rods bend to a radius of {bends_to(placed.net):.3g} m"
-        )
-        refuse_tipping(placed.net)
-        return placed
+        found = least_bent_net(
+            self.surface, spacing, gap, angles, self.say, self.allowance, shifted=angles is ANGLES, tell=self._say
+        )  # fmt: skip
+        self.angles, self.allowance.angle = found.angles or self.angles, found.best.angle
+        nets: list[Placed] = []
+        for each in (found.best, found.across):
+            if each is None or (nets and nets[0].net.edges):
+                break
+            nets.insert(0, replace(each, net=stand(each.net, self.surface, self.edges)))
+            self.say(net_told(nets[0], spacing))
+            refuse_tipping(nets[0].net)
+        return nets
 
     def _stands(
         self, placed: Placed, choice: RodChoice, spacing: float, thickness: float

@@ -1,4 +1,6 @@
 """The net that a first design begins with: of several angles and offsets the one that bends its rods least.
+On a saddle these lie along its straight lines, where they bear nothing as arches; there the net across is
+told too.
 
 Pulls that fail end earlier here than in a design: nets that are found take up to a hundred factorisations.
 Where no angle gives a net, the ladder (net/ladder.py) is climbed from the one whose failure costs least to
@@ -11,6 +13,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from shellform.net.chebyshev import NetSettings, NetTuning, net_at
 from shellform.net.edges import Edges, stand
@@ -25,6 +29,10 @@ from shellform.surface.shape.target import Surface
 
 ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
 _ALIKE = 0.05  # of curvature: nets that bend rods alike are told apart by their cost
+_ACROSS = 45.0  # degrees: from the straight lines of a saddle to its arches
+_ARCHED = (
+    2.0  # times the curvature of rods along these; across a barrel's diagonals 1.4, on saddles 2.6 to 5.4
+)
 _PULL, _BRIEF = 110, 70  # factorisations of one pull
 _PULLS, _USUAL_CROSSINGS = 450, 300  # factorisations of failed pulls, for so many crossings
 _LARGEST = 20.0  # times the usual crossings: hours of a processor before a design must have been found
@@ -82,6 +90,17 @@ def larger(surface: Surface, spacing: float | None) -> float:
     return min(max(across, 1.0), math.sqrt(_LARGEST)) ** 2
 
 
+@dataclass(frozen=True, eq=False)
+class FirstNets:
+    """The `best` net, which bends its rods least; up to two `angles`, degrees, that bend them nearly as
+    little, none where only the ladder gave a net; and the net `across` (None: it isn't needed, or wasn't
+    found), where the best one's rods lie along the straight lines of a saddle."""
+
+    best: Placed
+    angles: tuple[float, ...]
+    across: Placed | None = None
+
+
 def least_bent_net(
     surface: Surface,
     spacing: float,
@@ -92,11 +111,10 @@ def least_bent_net(
     *,
     shifted: bool,
     tell: Say,
-) -> tuple[Placed, list[float]]:
+) -> FirstNets:
     """The net that bends its rods least among those at the `angles`, degrees, and, if it is to be `shifted`,
-    the best of these half a spacing off; and up to two angles that bend them nearly as little, none where
-    only the ladder gave a net. `say` hears what fails, `tell` what doesn't; the `allowance` is spent. Raises
-    NoNet or Stalled."""
+    the best of these half a spacing off. `say` hears what fails, `tell` what doesn't; the `allowance` is
+    spent. Raises NoNet or Stalled."""
     limit = _PULL if allowance.thorough else _BRIEF
     settings = NetSettings(spacing=spacing, gap=gap, elements=ELEMENTS, tuning=NetTuning(limit=limit))
 
@@ -124,8 +142,11 @@ def least_bent_net(
         best = _least_bent(nets)
         most = (1.0 + 2.0 * _ALIKE) * best.net.quality.curvature_max
         near = [each.angle for each in nets if each.net.quality.curvature_max <= most][:2]
+        across = _across(best, nets)
         moved = at(best.angle, (0.5, 0.5)) if shifted else None
-        return (_least_bent([best, moved]) if isinstance(moved, Placed) else best), near
+        best = _least_bent([best, moved]) if isinstance(moved, Placed) else best
+        further = dict.fromkeys([*near, *([across.angle] if across else [])])
+        return FirstNets(best, tuple(further), across)
     first, failed = min(
         ((k, each) for k, each in enumerate(pulled) if not isinstance(each, Placed)),
         key=lambda each: (isinstance(each[1], Stalled), each[0]),  # whose next attempts take longest
@@ -143,7 +164,7 @@ def least_bent_net(
         near=False,
         progress=tell,
     )
-    return Placed(net, math.degrees(given.angle), given.offset), []
+    return FirstNets(Placed(net, math.degrees(given.angle), given.offset), ())
 
 
 def with_gap(
@@ -170,9 +191,31 @@ def with_gap(
     return Placed(stand(net, surface, edges), math.degrees(given.angle), given.offset)
 
 
+def net_told(placed: Placed, spacing: float) -> str:
+    """What the net of a `spacing`, m, is."""
+    return (
+        f"net at {placed.angle:g}° and {spacing:g} m: {len(placed.net.grid.lattice)} crossings, "
+        f"rods bend to a radius of {bends_to(placed.net):.3g} m"
+    )
+
+
 def bends_to(net: Net) -> float:
     """The least radius, m, to which its rods are bent."""
     return 1.0 / max(net.quality.curvature_max, 1e-12)
+
+
+def _across(best: Placed, nets: Sequence[Placed]) -> Placed | None:
+    """Of the nets the one across the straight lines along which the `best` one's rods lie, if they do."""
+    for each in nets:
+        turned = (each.angle - best.angle) % 90.0
+        if math.isclose(turned, _ACROSS) and arching(each.net) > _ARCHED * arching(best.net):
+            return each
+    return None
+
+
+def arching(net: Net) -> float:
+    """How much its rods are bent out of the surface, 1/m, in the root of the mean square."""
+    return float(np.sqrt(np.mean(net.curvature[:, 0] ** 2)))
 
 
 def _worth(surface: Surface, spacing: float) -> int:

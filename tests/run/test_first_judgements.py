@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.run import first_design, first_trial, next_trial, unbuildable
+from shellform.run import first_design, first_net, first_trial, next_trial, unbuildable
 from shellform.run.first_design import _Search
-from shellform.run.first_net import Allowance
+from shellform.run.first_net import Allowance, FirstNets
 from shellform.run.first_trial import Followed
 from shellform.run.next_trial import bears_most
 from shellform.run.sizes import DesignWish, Placed
@@ -454,20 +454,55 @@ def test_a_surface_that_no_net_covers_is_refused_in_sentences(monkeypatch):
 
 def test_a_search_tells_the_crossings_of_the_net_that_it_proposes(monkeypatch):
     """Rods that run beside an edge are left out where the net is stood up: 257 crossings of 259."""
-    pulled, stood = (SimpleNamespace(grid=SimpleNamespace(lattice=range(count))) for count in (259, 257))
-    monkeypatch.setattr(
-        first_design, "least_bent_net", lambda *_, **__: (Placed(pulled, 30.0, (0.0, 0.0)), None)
+    pulled, stood = (
+        SimpleNamespace(grid=SimpleNamespace(lattice=range(count)), edges=()) for count in (259, 257)
     )
-    monkeypatch.setattr(first_design, "stand", lambda net, *_: stood if net is pulled else None)
+    said = nets_of(monkeypatch, FirstNets(Placed(pulled, 30.0, (0.0, 0.0)), ()), [(pulled, stood)])[1]
+    assert said == ["net at 30° and 0.5 m: 257 crossings, rods bend to a radius of 257 m"]
+
+
+@pytest.mark.parametrize(("edges", "order"), [((), [75.0, 30.0]), (("a beam",), [30.0])])
+def test_on_a_saddle_the_net_across_comes_first_unless_its_arches_push_against_edge_beams(
+    monkeypatch, edges, order
+):
+    pulled, stood = (
+        [SimpleNamespace(grid=SimpleNamespace(lattice=range(9)), edges=own) for _ in range(2)]
+        for own in ((), edges)
+    )
+    best, across = (Placed(net, angle, (0.0, 0.0)) for net, angle in zip(pulled, (30.0, 75.0), strict=True))
+    found, said = nets_of(
+        monkeypatch, FirstNets(best, (30.0, 75.0), across), list(zip(pulled, stood, strict=True))
+    )
+    assert [each.angle for each in found] == order
+    assert [each.net for each in found] == stood[: len(order)][::-1]
+    assert len(said) == len(order)
+
+
+def nets_of(monkeypatch, found, stood):
+    """The nets in the order in which they are tried, and what is said of them, where these are `found` and
+    `stood` has what each is once it has stood up."""
+    monkeypatch.setattr(first_design, "least_bent_net", lambda *_, **__: found)
+    monkeypatch.setattr(first_design, "stand", lambda net, *_: next(up for flat, up in stood if flat is net))
     monkeypatch.setattr(first_design, "refuse_tipping", lambda _: None)
-    monkeypatch.setattr(first_design, "bends_to", lambda net: float(len(net.grid.lattice)))
+    monkeypatch.setattr(first_net, "bends_to", lambda net: float(len(net.grid.lattice)))
     said = []
     search = SimpleNamespace(
         surface=None, wish=SimpleNamespace(angle=30.0), allowance=SimpleNamespace(), edges=None,
         angles=(), say=said.append, _say=said.append,
     )  # fmt: skip
-    assert _Search._net(search, 0.5, 0.02).net is stood
-    assert said == ["net at 30° and 0.5 m: 257 crossings, rods bend to a radius of 257 m"]
+    return _Search._nets(search, 0.5, 0.02), said
+
+
+def test_every_net_is_tried_with_single_rods_before_two_layers(monkeypatch):
+    nets = [SimpleNamespace(angle=angle, net=SimpleNamespace(edges=())) for angle in (75.0, 30.0)]
+    tried = []
+    monkeypatch.setattr(first_design, "choices", lambda net, spacing, rod, layers: [layers])
+    search = SimpleNamespace(
+        _nets=lambda *_: nets, layers=(1, 2), wish=SimpleNamespace(rod=None), best="what came nearest",
+        _first_that_stands=lambda placed, possible, *_: tried.append((possible[0], placed.angle)),
+    )  # fmt: skip
+    assert _Search._on_net(search, 0.5, 0.05) is None
+    assert tried == [(1, 75.0), (1, 30.0), (2, 75.0), (2, 30.0)]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from shellform.net.refusal import Stalled
@@ -13,10 +14,12 @@ from shellform.run.sizes import MOST_CROSSINGS, Placed
 SURFACE = SimpleNamespace(area=100.0)
 
 
-def net(curvature, cost=1.0):
+def net(curvature, cost=1.0, arching=1.0):
+    """A net whose rods are bent out of the surface by `arching` and -`arching`, 1/m."""
     return SimpleNamespace(
-        quality=SimpleNamespace(curvature_max=curvature), grid=None, target=None, cost=cost, edges=()
-    )
+        quality=SimpleNamespace(curvature_max=curvature), grid=None, target=None, cost=cost, edges=(),
+        curvature=np.array([[arching, 9.0], [-arching, 0.0]]),
+    )  # fmt: skip
 
 
 class Pulls:
@@ -40,10 +43,10 @@ def pulled(monkeypatch):
         monkeypatch.setattr(first_net, "net_at", pulls)
         monkeypatch.setattr(first_net, "refuse_nearness", lambda *_: None)
         monkeypatch.setattr(first_net, "cost", lambda own: own.cost)
-        placed, near = least_bent_net(
+        nets = least_bent_net(
             SURFACE, 0.5, 0.02, angles, said.append, allowance, shifted=shifted, tell=told.append
         )
-        return placed, near, pulls.asked, (said, told)
+        return nets.best, list(nets.angles), pulls.asked, (said, told)
 
     return found
 
@@ -59,6 +62,23 @@ def test_the_least_bent_net_is_taken_of_those_alike_the_cheapest_and_angles_near
     assert allowance.left == 5000 - 4 * 400
     assert said == []
     assert told[0] == "net at 45°, 0.5 m: rods bend to a radius of 1 m"
+
+
+@pytest.mark.parametrize(("arching", "told"), [(0.41, True), (0.39, False)])
+def test_on_a_saddle_the_net_across_its_straight_lines_is_told_and_tried_at_finer_spacings_too(
+    pulled, arching, told
+):
+    """The rods that are bent least lie along them: at half a right angle others are bent more than twice as
+    much, whether the best is shifted or not."""
+    nets = {"a45": net(1.0, arching=0.2), "a0": net(3.0, arching=arching), "a23": net(2.0, arching=9.0)}
+    for more in ({}, {"a45s": net(0.9, arching=0.1)}):
+        placed, near, *_ = pulled(Allowance(5000), (45.0, 23.0, 0.0), bool(more), **nets, **more)
+        found = least_bent_net(
+            SURFACE, 0.5, 0.02, (45.0, 23.0, 0.0), print, Allowance(5000), shifted=bool(more), tell=print
+        )
+        assert placed.angle == 45.0
+        assert near == ([45.0, 0.0] if told else [45.0])
+        assert (found.across and found.across.net) == (nets["a0"] if told else None)
 
 
 @pytest.mark.parametrize(
