@@ -239,7 +239,10 @@ def _knots(knots: Reals) -> tuple[Reals, Indices]:
 def _draft(
     where: Path, size: float | None, up: str, face: str | None, before_mesh: Callable[[float], None]
 ) -> Draft:
-    plan = extent()[list(level_axes(up))]
+    sides = extent()
+    if not sides.max() > 0.0:
+        raise InputError("has no extent", where=str(where), remedy="Export the surface anew.")
+    plan = sides[list(level_axes(up))]
     mesh = float(plan.max()) / _DEFAULT_EDGES if size is None else size
     points, triangles, normals = mesh_faces(mesh, where, face, up, before_mesh=before_mesh)
     notes = (

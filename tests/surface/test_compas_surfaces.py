@@ -79,8 +79,11 @@ def test_several_are_one_surface_or_chosen_by_name(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"mults_u": [4, 1, 1, 3]}, r"5 × 4 control points don't go with 9 and 6 knots.*STEP"),
+        ({"mults_u": [4, 1, 1, 3]}, r"surface 1: 5 × 4 control points don't go with 9 and 6 knots.*STEP"),
         ({"weights": [[1.0]]}, "NURBS surface .* is damaged: control points"),
+        ({"weights": [[np.nan] * 4] * 5}, "damaged: a weight or a knot is no number"),
+        ({"knots_u": [0.0, np.inf, 2.0, 3.0]}, "damaged: a weight or a knot is no number"),
+        ({"points": [[[1.0, 1.0, 1.0]] * 4] * 5}, "has no extent"),
         ({"degree_u": "two"}, "NURBS surface .* is damaged"),
         ({"points": [[[np.nan, 0.0, 0.0]] * 4] * 5}, "coordinate that is no number"),
         ({"dtype": "compas.geometry/Brep"}, "holds no COMPAS mesh.*a Brep as STEP"),
@@ -88,8 +91,9 @@ def test_several_are_one_surface_or_chosen_by_name(tmp_path):
 )
 def test_a_compas_surface_that_cannot_be_used_is_refused_with_what_to_do(tmp_path, changed, said):
     file = written(tmp_path / "a.json", **changed)
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=said) as caught:
         read_surface(file)
+    assert str(caught.value).count(str(file)) == 1
 
 
 def test_json_that_is_not_whole_is_said_to_be_so(tmp_path):

@@ -80,6 +80,8 @@ def read_compas_surfaces(
         if meant:
             try:
                 read.append(_patch(table, unit_factor(unit or "m"), f"{file}, {name}"))
+            except InputError:
+                raise
             except (KeyError, TypeError, ValueError, OverflowError) as error:
                 raise InputError(
                     f"its NURBS surface {name} is damaged: {error}", where=str(file), remedy="Save it anew."
@@ -104,6 +106,8 @@ def _patch(table: dict[str, Any], factor: float, where: str) -> tuple[Patch, boo
         np.repeat(np.array(table[f"knots_{way}"], dtype=float), np.array(table[f"mults_{way}"], dtype=int))
         for way in "uv"
     )
+    if not all(np.isfinite(each).all() for each in (weights, *vectors)):
+        raise ValueError("a weight or a knot is no number")
     rows, columns = points.shape[:2]
     along_u, along_v = (_fits(vectors, degree, counts) for counts in ((rows, columns), (columns, rows)))
     if not along_u and not along_v:
