@@ -40,9 +40,9 @@ def stage_keys(case: Case, *, sketch: bool = False) -> dict[str, str]:
     entries["stock"] |= {"adjustment": entries["cable"].pop("adjustment")}
     entries["edge_beam"] = entries["edges"].pop("beam")  # no net depends on its section
     told = {
-        name: entries["safety"].pop(name) for name in ("drawn", "compared", "confidence")
+        name: entries["safety"].pop(name) for name in ("drawn", "compared", "confidence", "rare")
     }  # on which no search depends, but for how many it draws itself
-    entries["told"] = told
+    entries["told"] = told | {"built_deviation": entries["limits"].pop("built_deviation")}
     entries["safety"] |= {"searched": min(told["drawn"], SEARCHED)}
     status = file.stat()
     digest = hashlib.sha256(

@@ -173,6 +173,8 @@ def changed(tmp_path, *, sketch=False, **tables):
         ({"safety": {"drawn": 201}}, "safety"),  # a search draws 200 at the most
         ({"safety": {"drawn": 199}}, "optimise"),
         ({"safety": {"confidence": 0.9}}, "safety"),
+        ({"safety": {"rare": 200}}, "safety"),
+        ({"limits": {"built_deviation": 0.01}}, "safety"),  # by which designs are judged, not searched
         ({"figures": {"limit": 0.01}}, "figures"),
         ({"title_block": {"revision": "B"}}, "documents"),
     ],
