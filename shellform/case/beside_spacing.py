@@ -31,7 +31,7 @@ def refuse_others(
             f"must be well below net.spacing ({spacing:g} m)",
             where="joint.gap",
             value=joint.gap,
-            remedy=f"Give metres, twice the rod's radius as is usual.{if_other_unit(joint.gap, MILLIMETRES, 0.002 * spacing, 0.4 * spacing)}",
+            remedy=f"Give metres, twice the rod's radius as is usual, or rods more than {2.0 * joint.gap:g} m apart (net.spacing).{if_other_unit(joint.gap, MILLIMETRES, 0.002 * spacing, 0.4 * spacing)}",
         )
     for name in DEVIATIONS:
         deviation = getattr(tolerances, name)

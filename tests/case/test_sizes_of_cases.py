@@ -258,3 +258,5 @@ def test_rods_that_are_deeper_than_wide_may_be_so_beside_any_spacing():
 
 def test_a_gap_as_wide_as_half_the_spacing_is_refused():
     assert re.search(r"joint.gap: must be well below net.spacing \(0.055 m\)", told(VAULT, "joint.gap=0.1"))
+    assert "rods more than 0.056 m apart (net.spacing)" in told(VAULT, "rod.radius=0.014", "joint.gap=0.028")
+    load_case(VAULT, ["rod.radius=0.014", "joint.gap=0.028", "net.spacing=0.0561"])
