@@ -7,6 +7,7 @@ import pytest
 
 import shellform as sf
 from shellform.net.refusal import NoNet, Reason
+from shellform.surface.readers import teeth
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.reading import surface_of
 from shellform.surface.shape.target import curvature, make_surface
@@ -92,6 +93,24 @@ def test_corners_that_are_meant_stay_corners(turn):
     assert np.abs(off).max() < 0.35 * 0.5
     for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
         assert np.linalg.norm(plan - half * signs, axis=1).min() < 0.5 * 0.5
+
+
+def test_a_corner_is_sought_where_the_curve_comes_to_least_as_solving_for_each_tells():
+    random = np.random.default_rng(4)
+    turn = 2.0 * np.pi * np.arange(60) / 60
+    radius = 5.0 + np.abs(np.sin(2.0 * turn)) + random.uniform(-0.2, 0.2, 60)
+    corners = radius[:, None] * np.column_stack([np.cos(turn), np.sin(turn), 0.1 * np.sin(turn)])
+    weight, stiffness, kept = np.where(turn < 1.0, 1e8, 1.0), 40.0, np.array([15])
+    bends = 2.0 * np.eye(60) - np.roll(np.eye(60), 1, axis=0) - np.roll(np.eye(60), -1, axis=0)
+
+    def comes_to(corner):
+        rows = np.delete(bends, [*kept, corner], axis=0)
+        placed = np.linalg.solve(np.diag(weight) + stiffness * rows.T @ rows, weight[:, None] * corners)
+        return np.sum(weight[:, None] * (placed - corners) ** 2) + stiffness * np.sum((rows @ placed) ** 2)
+
+    for first in (20, 32, 50):
+        tried = np.arange(first, first + 8)
+        assert teeth._loosest(corners, weight, stiffness, kept, tried) == min(tried, key=comes_to)
 
 
 @pytest.mark.parametrize("turn", [0.0, 17.0, 45.0])

@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu, spsolve
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Flags, Indices, Reals
@@ -179,7 +179,7 @@ def _curve(corners: Reals, side: float) -> Reals:
     stiffness = (reach / (2.0 * np.pi)) ** 4
     kept = _meant(corners, weight, stiffness, round(0.25 * reach))
     for _ in range(_TIGHTENINGS):
-        placed, _ = _bent(corners, weight, stiffness, kept)
+        placed = _bent(corners, weight, stiffness, kept)
         off = np.linalg.norm(placed - corners, axis=1) / side
         if off.max() <= 1.0:
             break
@@ -187,37 +187,51 @@ def _curve(corners: Reals, side: float) -> Reals:
     return middle + np.where(free[:, None], placed, corners)
 
 
-def _bent(corners: Reals, weight: Reals, stiffness: float, kept: Indices) -> tuple[Reals, float]:
+def _bent(corners: Reals, weight: Reals, stiffness: float, kept: Indices) -> Reals:
     """The curve (n, 3) that lies near the `corners` (n, 3) by their `weight` (n,) and bends little by its
-    `stiffness`, but at the corners that are `kept` (c,) as freely as it likes; and what it comes to."""
-    count = len(corners)
+    `stiffness`, but at the corners that are `kept` (c,) as freely as it likes."""
+    return np.asarray(spsolve(_matrix(weight, stiffness, kept), weight[:, None] * corners))
+
+
+def _matrix(weight: Reals, stiffness: float, kept: Indices) -> sp.csc_array:
+    """W + k B'B (n, n), without the rows of B at the corners that are `kept` (c,)."""
+    bend = _bends(len(weight))[np.delete(np.arange(len(weight)), kept)]
+    return sp.csc_array(sp.diags_array(weight) + stiffness * (bend.T @ bend))
+
+
+def _bends(count: int) -> sp.csr_array:
+    """B (n, n), the second differences along a closed curve of so many corners."""
     ring = sp.eye_array(count, k=1) + sp.eye_array(count, k=1 - count)
-    bend = sp.csr_array(2.0 * sp.eye_array(count) - ring - ring.T)[np.delete(np.arange(count), kept)]
-    placed = spsolve(
-        sp.csc_array(sp.diags_array(weight) + stiffness * (bend.T @ bend)), weight[:, None] * corners
-    )
-    cost = np.sum(weight[:, None] * (placed - corners) ** 2) + stiffness * np.sum((bend @ placed) ** 2)
-    return placed, float(cost)
+    return sp.csr_array(2.0 * sp.eye_array(count) - ring - ring.T)
 
 
 def _meant(corners: Reals, weight: Reals, stiffness: float, half: int) -> Indices:
     """The corners (c,) of a toothed edge that are no teeth: where the curve turns sharply within `half` of
     its corners on either side, and has a sharp corner once it may."""
     count = len(corners)
-    placed, _ = _bent(corners, weight, stiffness, np.zeros(0, dtype=np.int64))
-    turn = _turn(placed, half)
+    turn = _turn(_bent(corners, weight, stiffness, np.zeros(0, dtype=np.int64)), half)
     kept, seen = list[int](), list[int]()
     for place in np.argsort(-turn, kind="stable"):
         apart = [min((place - other) % count, (other - place) % count) for other in seen]
         if turn[place] <= _SHARP_TURN or min(apart, default=count) <= 2 * half:
             continue
         seen.append(int(place))
-        tried = [(place + shift) % count for shift in range(-half, half + 1)]
-        found = [_bent(corners, weight, stiffness, np.array([*kept, each])) for each in tried]
-        best = min(range(len(tried)), key=lambda k: found[k][1])
-        if _turn(found[best][0], 1)[tried[best]] > _CORNER:
-            kept.append(tried[best])
+        around = np.arange(place - half, place + half + 1) % count
+        best = _loosest(corners, weight, stiffness, np.array(kept, dtype=np.int64), around)
+        if _turn(_bent(corners, weight, stiffness, np.array([*kept, best])), 1)[best] > _CORNER:
+            kept.append(best)
     return np.array(kept, dtype=np.int64)
+
+
+def _loosest(corners: Reals, weight: Reals, stiffness: float, kept: Indices, tried: Indices) -> int:
+    """That one of the corners `tried` (t,), none of them `kept`, at which the curve comes to least once it
+    may bend there: with x the curve, A its matrix and b the corner's row of B, to k (b'x)² / (1 - k b'A⁻¹b)
+    less."""
+    solve = splu(_matrix(weight, stiffness, kept)).solve
+    rows = _bends(len(corners))[tried].toarray()
+    bent = ((rows @ solve(weight[:, None] * corners)) ** 2).sum(axis=1)
+    held = stiffness * np.sum(rows * solve(rows.T).T, axis=1)
+    return int(tried[np.argmax(bent / (1.0 - held))])
 
 
 def _turn(corners: Reals, half: int) -> Reals:
