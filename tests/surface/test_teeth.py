@@ -143,6 +143,19 @@ def test_of_a_ragged_scan_spikes_are_taken_off_first():
     assert np.abs(np.hypot(*edge(surface)[:, :2].T) - 6.0).max() < 0.3
 
 
+@pytest.mark.parametrize("width", [0.25, 0.5])
+def test_what_hangs_on_by_a_neck_of_a_face_or_two_is_not_lost(width):
+    def inside(plan):
+        return (np.hypot(np.abs(plan[:, 0]) - 4.0, plan[:, 1]) < 3.0) | (
+            (np.abs(plan[:, 1]) < 0.5 * width) & (np.abs(plan[:, 0]) < 4.0)
+        )
+
+    points, faces = cut(16.0, 0.2, inside)
+    surface = surface_of(Draft(points, faces), "two discs")
+    assert surface.area == pytest.approx(make_surface(points, faces).area, rel=0.03)
+    assert any("its edge is toothed and was left so" in note for note in surface.mended)
+
+
 def test_far_from_the_origin_the_edge_is_the_same():
     points, faces = cut(14.0, 0.4, disc(6.0))
     far = np.array([5e5, 4e6, 300.0])

@@ -43,6 +43,9 @@ _TIGHTENINGS = 40  # of the weights, at the most
 _AROUND = 24  # vertices to which the surface is fitted
 _THIN = 0.1  # of the edge's median side: the least height of a triangle
 _ROUNDS = 12  # of dropping triangles
+_BROKEN_OFF = (
+    0.02  # of the triangles: a larger piece that would hang together with the others no more is meant
+)
 _PEELED = 3  # times that spikes are taken off an edge too ragged to be smoothed
 
 
@@ -61,7 +64,10 @@ def without_teeth(draft: Draft) -> Draft:
         found = _smoothed(points, faces, curves)
         if found is not None:
             return _told(draft, *found, len(curves))
-        faces = _without_spikes(faces, len(points))
+        peeled = _without_spikes(faces, len(points))
+        if peeled is None:
+            return draft
+        faces = peeled
     return draft
 
 
@@ -70,7 +76,7 @@ def _smoothed(
 ) -> tuple[Reals, Indices, Tree] | None:
     """The points (v, 3) and the triangles that are left with smooth edges where these loops of vertices with
     their median sides, m, are; and the curves' straight pieces. None where triangles that turn over can't be
-    dropped."""
+    dropped, or a piece would break off."""
     placed, on_edge = points.copy(), np.zeros(len(points), dtype=bool)
     on_edge[_rim(faces, len(points))] = True
     for loop, side in curves:
@@ -92,7 +98,10 @@ def _smoothed(
             dropped = np.isin(faces, np.intersect1d(faces[turned], rim)).any(axis=1)
         if not dropped.any():
             break
-        faces = _whole(faces[~dropped])
+        left = _whole(faces[~dropped])
+        if left is None:
+            return None
+        faces = left
     starts = _rim(faces, len(points))[:, 0]
     if turned.any() or len(np.unique(starts)) < len(starts):
         return None
@@ -117,16 +126,17 @@ def _told(draft: Draft, placed: Reals, faces: Indices, track: Tree, edges: int) 
     )
 
 
-def _without_spikes(faces: Indices, count: int) -> Indices:
+def _without_spikes(faces: Indices, count: int) -> Indices | None:
     """The triangles without those of which two sides or more lie on the edge, and without what then hangs on
-    by a vertex alone; of `count` vertices."""
-    faces = _whole(faces[_on_rim(faces, count) < 2])
-    while True:
-        starts = _rim(faces, count)[:, 0]
+    by a vertex alone; of `count` vertices. None where a piece would break off."""
+    left = _whole(faces[_on_rim(faces, count) < 2])
+    while left is not None:
+        starts = _rim(left, count)[:, 0]
         met = np.flatnonzero(np.bincount(starts, minlength=count) > 1)
         if not len(met):
-            return faces
-        faces = _whole(faces[~np.isin(faces, met).any(axis=1)])
+            break
+        left = _whole(left[~np.isin(left, met).any(axis=1)])
+    return left
 
 
 def toothed(points: Reals, loop: Indices) -> float | None:
@@ -281,9 +291,11 @@ def _poor(before: Reals, after: Reals, faces: Indices, thin: float) -> tuple[Fla
     return np.sum(old * new, axis=1) <= 0.0, np.linalg.norm(new, axis=1) < thin * longest
 
 
-def _whole(faces: Indices) -> Indices:
-    """The triangles of the largest piece that hangs together by sides."""
+def _whole(faces: Indices) -> Indices | None:
+    """The triangles of the largest piece that hangs together by sides; None where another is no crumb."""
     first, second, _ = shared_edges(faces)
     links = sp.csr_array((np.ones(len(first)), (first, second)), shape=(len(faces), len(faces)))
     label = connected_components(links, directed=False)[1]
-    return faces[label == np.argmax(np.bincount(label))]
+    sizes = np.bincount(label, minlength=1)
+    others = np.delete(sizes, np.argmax(sizes))
+    return None if others.max(initial=0) > _BROKEN_OFF * len(faces) else faces[label == np.argmax(sizes)]
