@@ -5,10 +5,14 @@ comes in, with the number to write: "For 50 mm write 0.05." What is `possible` i
 hand's size, halls of 100 m and materials from foam to diamond; what doesn't suit the surface or the spacing
 is refused where these are known, with the same words (`if_other_unit`). A number that was converted twice is
 told as what it was: 0.00005 as 50 mm.
+
+What is told to people is written as they write it: digits in groups, forces in N, kN or MN, and powers of ten
+only where there would be more noughts than can be read at a glance.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -24,6 +28,9 @@ FORCES: Final = {"kN": 1e3}
 MILLINEWTONS: Final = {"mN": 1e-3}
 MASSES: Final = {"g": 1e-3}
 """By their names, so much of each in the SI unit."""
+_RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_NEWTONS: Final = (("MN", 1e6), ("kN", 1e3))
+_TEN: Final = 10.0  # of a unit: what is told in it
 _TWICE = 1e3  # what is lost where a number in the SI unit was taken for one in its thousandth
 
 
@@ -75,6 +82,31 @@ def if_other_unit(value: float, units: Mapping[str, float], low: float, high: fl
         if not told and low <= meant <= high:
             told = [f" For {meant / each:g} {unit} write {meant:.6g}."]
     return "".join(told)
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number for people: so many digits, in groups of three (12 300), as a power of ten (3 × 10⁻⁵) below
+    0.0001 and from a milliard on."""
+    if not math.isfinite(value):
+        return "?"
+    if value == 0.0:
+        return "0"
+    told = f"{value:.{digits - 1}e}"
+    if 1e-4 <= abs(float(told)) < 1e9:
+        places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+        text = f"{value:,.{places}f}".replace(",", "\u202f")
+        return text.rstrip("0").rstrip(".") if "." in text else text
+    mantissa, _, power = told.partition("e")
+    short = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+    return f"{short} × 10{str(int(power)).translate(_RAISED)}"
+
+
+def newtons(force: float, digits: int = 3) -> str:
+    """A force, N, for people, with its unit: N below 10 kN, kN below 10 MN."""
+    for unit, size in _NEWTONS:
+        if abs(force) >= _TEN * size:
+            return f"{number(force / size, digits)} {unit}"
+    return f"{number(force, digits)} N"
 
 
 ROD_SIZE: Final = Quantity(

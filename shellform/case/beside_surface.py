@@ -34,6 +34,8 @@ from shellform.quantities import (
     MASSES,
     MILLINEWTONS,
     if_other_unit,
+    newtons,
+    number,
 )
 from shellform.surface.shape.target import Surface
 
@@ -84,7 +86,9 @@ def doubts(case: Case, surface: Surface) -> tuple[str, ...]:
             if (weight < _LIGHT and not poured) or weight > _HEAVY:
                 likely = (each * entry.every * area for each in _LIKELY)
                 meant = if_other_unit(entry.force, FORCES | MILLINEWTONS, *likely)
-                told.append(_doubt(f"{where}.force", f"{entry.force:g} N", as_concrete(weight), meant))
+                told.append(
+                    _doubt(f"{where}.force", f"{number(entry.force, 6)} N", as_concrete(weight), meant)
+                )
         if isinstance(entry, ConcreteEntry):
             if entry.thickness > _THICK * side:
                 meant = if_other_unit(entry.thickness, LENGTHS, side / 1000.0, _THICK * side)
@@ -116,17 +120,17 @@ def doubts(case: Case, surface: Surface) -> tuple[str, ...]:
 
 def _of_cables(cable: CableEntry) -> Iterator[str]:
     """Where the largest force is less than what cables begin with, or no cable comes to it."""
-    most, value = cable.force_max, f"cable.force_max is {cable.force_max:g} N"
+    most, value = cable.force_max, f"cable.force_max is {number(cable.force_max, 6)} N"
     strained = cable.stiffness * (1.0 / cable.rest_ratio - 1.0)
     if strained > most:
         within = math.ceil(1e4 / (1.0 + most / cable.stiffness)) / 1e4
         begin = f" With cable.rest_ratio = {within:g} cables begin within it." if within < 1.0 else ""
         yield (
-            f"{value}: less than the {strained:.3g} N to which cable.rest_ratio strains cables of {cable.stiffness:g} N."
+            f"{value}: less than the {newtons(strained)} to which cable.rest_ratio strains cables of {newtons(cable.stiffness)}."
             f"{begin}{if_other_unit(most, FORCES, strained, cable.stiffness)}"
         )
     if most > STRETCHED * cable.stiffness:
-        yield f"{value}: so much as no cable of {cable.stiffness:g} N bears, so that it limits nothing."
+        yield f"{value}: so much as no cable of {newtons(cable.stiffness)} bears, so that it limits nothing."
 
 
 def _doubt(where: str, value: str, what: str, meant: str) -> str:

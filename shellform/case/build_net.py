@@ -18,6 +18,7 @@ from shellform.net.chebyshev import NetSettings
 from shellform.net.edges import Edges, Place, stand
 from shellform.net.net import Net
 from shellform.net.orientation import oriented_net
+from shellform.quantities import number
 from shellform.records.summary import EdgeRecord, NetRecord, SurfaceRecord
 from shellform.surface.shape.cut import cut_off
 from shellform.surface.shape.target import Surface
@@ -58,7 +59,7 @@ def refuse_distant(surface: Surface) -> None:
         return
     told = ", ".join(f"{each:.9g}" for each in origin)
     raise InputError(
-        f"lies {float(np.abs(surface.vertices).max()):.4g} m from the origin, {_DISTANT:g} times its size or more: beside "
+        f"lies {number(float(np.abs(surface.vertices).max()), 4)} m from the origin, {_DISTANT:g} times its size or more: beside "
         "such coordinates rounding hides the load",
         where="surface",
         remedy=f"Count from a point near it: origin = [{told}] in [surface], or --origin {told.replace(',', '')}.",
@@ -121,7 +122,7 @@ def surface_record(surface: Surface, source: str) -> SurfaceRecord:
 def size_text(size: Sequence[float] | Reals) -> str:
     """The extents (3,), m, in words, so that a wrong unit is seen."""
     x, y, z = size
-    return f"{x:.4g} × {y:.4g} × {z:.4g} m (is the unit right?)"
+    return f"{number(x, 4)} × {number(y, 4)} × {number(z, 4)} m (is the unit right?)"
 
 
 def net_of(

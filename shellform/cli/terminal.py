@@ -61,6 +61,8 @@ def refusal_words(error: Exception) -> tuple[str, int] | None:
 
 def tell_designs(summary: Summary) -> None:
     """What a designer asks first."""
+    from shellform.quantities import number
+
     for name, design in summary.designs.items():
         cells = [
             f"{load}: {1e3 * row.deviation_max:6.1f} mm max, {1e3 * row.deviation_mean:5.1f} mean"
@@ -70,13 +72,15 @@ def tell_designs(summary: Summary) -> None:
         print(f"{name:>10}  {design.cables:4d} cables  " + "   ".join(cells))
     found = summary.optimisation
     if found is not None:
-        print(f"objective {found.objective_start:.3g} -> {found.objective_end:.3g}: {found.status}")
+        print(f"objective {number(found.objective_start)} -> {number(found.objective_end)}: {found.status}")
         over = [f"{name} by {value:.1%}" for name, value in found.constraints.items() if value > 1e-3]
         if over:
             print(f"limits that are not kept: {', '.join(over)}")
     for each in summary.sections or ():
         tried = (
-            "no design" if each.objective is None else f"objective {each.objective:.3g}, {each.cables} cables"
+            "no design"
+            if each.objective is None
+            else f"objective {number(each.objective)}, {each.cables} cables"
         )
         print(f"{each.section:>10}  {tried}{'' if each.feasible else ': ' + each.why_not}")
     for sentence in () if summary.robust is None else summary.robust.sentences:
@@ -100,6 +104,7 @@ def tell_verdict(verdict: VerdictRecord) -> None:
 def tell_as_built(summary: Summary) -> None:
     """Of each design, up to which factor its loads may grow and how many drawn structures stand; how the one
     to build fails first."""
+    from shellform.quantities import number
     from shellform.records.words import (
         before_load_words,
         built_shape_words,
@@ -123,7 +128,7 @@ def tell_as_built(summary: Summary) -> None:
             if row.built_shape is not None:
                 parts.append(built_shape_words(row.built_shape))
             if row.expected_stiffness is not None:
-                parts.append(f"softest mode as built {row.expected_stiffness:.3g} N/m")
+                parts.append(f"softest mode as built {number(row.expected_stiffness)} N/m")
             if parts:
                 print(f"{name:>10}  {load}: {', '.join(parts)}")
     if summary.verdict is not None:

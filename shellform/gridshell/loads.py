@@ -29,6 +29,7 @@ from shellform.quantities import (
     LENGTHS,
     THICKNESS,
     if_other_unit,
+    number,
 )
 from shellform.structure.elements.sections import Section, mass_per_length
 from shellform.surface.shape.target import Surface
@@ -132,7 +133,7 @@ def as_concrete(weight: float) -> str:
     """What a weight, N/m², is like."""
     thickness = weight / (GRAVITY * CONCRETE)
     size = f"{thickness:.2g} m" if thickness >= 0.995 else f"{float(f'{1e3 * thickness:.2g}'):g} mm"
-    return f"{weight:.3g} N/m², as {size} of concrete"
+    return f"{number(weight)} N/m², as {size} of concrete"
 
 
 def refuse_bulk(surface: Surface, thickness: float, *, where: str) -> None:
@@ -288,12 +289,12 @@ def crossings_to_load(
 
 def _polygons(where: str, given: Sequence[ArrayLike]) -> list[Reals]:
     result = []
-    for number, polygon in enumerate(given):
-        corners = reals(f"{where}[{number}]", polygon, (None, 2))
+    for k, polygon in enumerate(given):
+        corners = reals(f"{where}[{k}]", polygon, (None, 2))
         if len(corners) < 3:
             raise InputError(
                 "needs at least three corners",
-                where=f"{where}[{number}]",
+                where=f"{where}[{k}]",
                 value=len(corners),
                 remedy="Give the corners' x and y in order, m, as [[0, 0], [1, 0], [0, 1]].",
             )

@@ -27,7 +27,8 @@ from shellform.output.pictures.colours import VIRIDIS
 from shellform.output.pictures.images import png_bytes
 from shellform.output.pictures.panel import Look, Panel
 from shellform.problem.paths import deviations
-from shellform.records.words import load_title, number
+from shellform.quantities import number
+from shellform.records.words import load_title
 from shellform.structure.elements.state import State
 
 _SIZE = (900, 560)  # pixels, of a picture

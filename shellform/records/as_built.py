@@ -12,10 +12,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
+from shellform.quantities import number
 from shellform.records.check import UNASKED, UNKNOWN, Cell, Check, Subject
 from shellform.records.remedies import RodsOf
 from shellform.records.summary import DesignRecord, LoadRecord
-from shellform.records.words import critical_words, load_title, number, standing_words
+from shellform.records.words import critical_words, load_title, standing_words
 from shellform.reliability.safety import allowed
 
 EQUAL = 1e-3  # relative: critical factors that count as equal

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from shellform.records.words import number
+from shellform.quantities import newtons, number
 
 SLACK = 1e-3  # of a limit: what the optimiser itself lets pass
 
@@ -63,8 +63,13 @@ def share_of(value: float, remedy: str = "") -> Cell:
     return Cell(f"{100.0 * value:.0f} %", value <= 1.0 + SLACK, remedy=remedy)
 
 
+def quantity(value: float, unit: str) -> str:
+    """A value with its unit, a force in the unit in which it is read."""
+    return newtons(value) if unit == "N" else f"{number(value)} {unit}"
+
+
 def below(value: float | None, limit: float, unit: str, remedy: str = "") -> Cell:
     """A value that mustn't exceed its limit."""
     if value is None or not math.isfinite(value):
         return UNKNOWN
-    return Cell(f"{number(value)} {unit}", value <= limit * (1.0 + SLACK), remedy=remedy)
+    return Cell(quantity(value, unit), value <= limit * (1.0 + SLACK), remedy=remedy)

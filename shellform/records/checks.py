@@ -13,17 +13,19 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
+from shellform.quantities import newtons, number
 from shellform.records.as_built import AsBuilt, critical_checks, guide_checks, standing_checks
-from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, Subject, below, share_of
+from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, Subject, below, quantity, share_of
 from shellform.records.optimisation import OptimisationRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count, allow_less
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
-from shellform.records.words import constraint_titles, load_title, number
+from shellform.records.words import constraint_titles, load_title
 
 BUILT = ("optimised", "rounded", "polished")  # in the order in which they are made
 _SQUARED = ("misfit", "built_misfit")  # sums of squares of what users limit as a root mean square
 _AT_LEAST = ("softness", "slackness")  # of which as much is demanded, not at most
-_SETTLED = 1e-6  # unbalanced over largest force: what an equilibrium that counts as found stays below
+# Unbalanced over largest force: what an equilibrium that counts as found stays below.
+_SETTLED, _SETTLED_TOLD = 1e-6, "unbalanced force up to a millionth of the largest"
 _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or loosen the limit."
 
 
@@ -117,7 +119,7 @@ def checks(
         *_of_the_optimiser(summary.optimisation, rows, list(designs)),
         *judged.under(
             "In equilibrium",
-            f"unbalanced force up to {_SETTLED:.0e} of the largest",
+            _SETTLED_TOLD,
             lambda row, rods: _settled(row),
             loads,
         ),
@@ -269,9 +271,9 @@ def _pulled_before(rows: Mapping[str, DesignRecord], designs: Sequence[str], for
     """The largest cable force before any load, which is told and not asked for, where it is known; `force`,
     N: the limit under load."""
     pulls = {name: row.loads["none"].cable_force_max for name, row in rows.items() if "none" in row.loads}
-    told = {name: Cell(f"{number(pull)} N", None, False) for name, pull in pulls.items() if pull is not None}
+    told = {name: Cell(newtons(pull), None, False) for name, pull in pulls.items() if pull is not None}
     cells = {name: told.get(name, UNASKED) for name in designs}
-    limit = f"told; the limit, {number(force)} N, counts under load"
+    limit = f"told; the limit, {newtons(force)}, counts under load"
     return [Check("Largest cable force before any load", limit, cells)] if told else []
 
 
@@ -284,7 +286,7 @@ def _at_most(limit: _Limit, most: float, rows: Mapping[str, DesignRecord], desig
             if value is None or not math.isfinite(value)
             else below(limit.times * value, limit.times * most, limit.unit, allow(limit.entry, value))
         )
-    return Check(limit.title, f"{number(limit.times * most)} {limit.unit}", cells)
+    return Check(limit.title, quantity(limit.times * most, limit.unit), cells)
 
 
 def _of_the_optimiser(
@@ -335,11 +337,9 @@ def _taut(rows: Mapping[str, DesignRecord], designs: Sequence[str], load: str, l
             allow_less("limits.slack_min", pull) if pull else "Leave limits.slack_min out, or let it be 0.01."
         )
         cells[name] = (
-            UNKNOWN
-            if pull is None
-            else Cell(f"{number(pull)} N", pull >= least * (1.0 - SLACK), remedy=remedy)
+            UNKNOWN if pull is None else Cell(newtons(pull), pull >= least * (1.0 - SLACK), remedy=remedy)
         )
-    return Check(f"Least pull of a cable under {load_title(load)}", f"at least {number(least)} N", cells)
+    return Check(f"Least pull of a cable under {load_title(load)}", f"at least {newtons(least)}", cells)
 
 
 def _stands(row: LoadRecord, rods: RodsOf) -> Cell:
@@ -351,7 +351,7 @@ def _stands(row: LoadRecord, rods: RodsOf) -> Cell:
 
 
 def _settled(row: LoadRecord) -> Cell:
-    return UNASKED if row.residual is None else Cell(f"{row.residual:.0e}", bool(row.residual <= _SETTLED))
+    return UNASKED if row.residual is None else Cell(number(row.residual, 1), bool(row.residual <= _SETTLED))
 
 
 def _constraint(name: str, value: float) -> Cell:

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 
+from shellform.quantities import number
 from shellform.records.thicker_rods import ThickerRodsRecord
-from shellform.records.words import number
 
 _CLOSER = 0.8  # of the spacing, where rods may not become thicker
 _EQUAL = 1e-9  # relative: radii that count as equal
@@ -124,12 +125,17 @@ def rounded_up(value: float) -> float:
 def _up(value: float) -> str:
     """To two digits, to the safe side."""
     size = _digit(value)
-    return f"{math.ceil(value / size - 1e-9) * size:.3g}"
+    return _plain(math.ceil(value / size - 1e-9) * size)
 
 
 def _down(value: float) -> str:
     size = _digit(value)
-    return f"{math.floor(value / size + 1e-9) * size:.3g}"
+    return _plain(math.floor(value / size + 1e-9) * size)
+
+
+def _plain(value: float) -> str:
+    """To three digits, without a power of ten: 1450000 is read at a glance and can be written in a case."""
+    return f"{Decimal(f'{value:.3g}'):f}"
 
 
 def _digit(value: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from shellform.quantities import newtons, number
 from shellform.records.failures import RareRecord
 from shellform.records.summary import BuiltShapeRecord, DesignRecord, LoadRecord, StandingRecord, Summary
 
@@ -77,17 +78,6 @@ def constraint_titles(names: Iterable[str]) -> dict[str, str]:
     return titles
 
 
-def number(value: float, digits: int = 3) -> str:
-    """A number for people: so many digits, no exponent where it can be avoided."""
-    if not math.isfinite(value):
-        return "?"
-    if value == 0.0 or 1e-3 <= abs(value) < 1e6:
-        places = 0 if value == 0.0 else max(0, digits - 1 - math.floor(math.log10(abs(value))))
-        text = f"{value:,.{places}f}".replace(",", "\u202f")
-        return text.rstrip("0").rstrip(".") if "." in text else text
-    return f"{value:.{digits}g}"
-
-
 def standing_words(own: StandingRecord) -> str:
     """How many structures as built stand, and how sure that is."""
     return f"{standing_count_words(own)} ({confidence_words(own)})"
@@ -147,7 +137,7 @@ def before_load_words(designs: Mapping[str, DesignRecord], name: str, limit: flo
     found, pull = [], row.cable_force_max
     if pull is not None and limit is not None and exceeds(pull, limit):
         found.append(
-            f"a cable pulls {number(pull)} N, more than the {number(limit)} N of cable.force_max, which counts under load"
+            f"a cable pulls {newtons(pull)}, more than the {newtons(limit)} of cable.force_max, which counts under load"
         )
     if row.slack:
         found.append(f"{listed(row.slack)} {'hangs' if len(row.slack) == 1 else 'hang'} slack")
@@ -161,16 +151,16 @@ def above_words(row: LoadRecord | None, limit: float | None) -> str:
     if pull is None:
         return ""
     more = (
-        f", more than the {number(limit)} N that it may pull under load"
+        f", more than the {newtons(limit)} that it may pull under load"
         if limit is not None and exceeds(pull, limit)
         else ""
     )
-    return f"{number(pull)} N at most before any load{more}"
+    return f"{newtons(pull)} at most before any load{more}"
 
 
 def exceeds(pull: float, limit: float) -> bool:
     """Whether a cable pulls more than the limit by what is told of both."""
-    return pull > limit and number(pull) != number(limit)
+    return pull > limit and newtons(pull) != newtons(limit)
 
 
 def shape_notes(summary: Summary, name: str) -> list[str]:

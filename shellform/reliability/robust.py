@@ -26,6 +26,7 @@ from shellform.arrays import Reals, Record
 from shellform.errors import require_count
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
+from shellform.quantities import number
 from shellform.reliability.drawing import errors_by_cause
 from shellform.reliability.first_order import moved_from
 from shellform.reliability.perfect import TO_ITS_END, perfect
@@ -57,9 +58,9 @@ class Spread(Record):
             1e3 * np.sqrt(each / len(self.node_deviation)) for each in (self.mean, self.nominal)
         )
         result = [
-            f"As built the misfit is {self.mean:.3g} ± {self.deviation:.2g} m² (mean and standard deviation, to "
-            f"first order), {built:.3g} mm a node in root mean square, against {self.nominal:.3g} m² and "
-            f"{planned:.3g} mm as planned."
+            f"As built the misfit is {number(self.mean)} ± {number(self.deviation, 2)} m² (mean and standard deviation, to "
+            f"first order), {number(float(built))} mm a node in root mean square, against {number(self.nominal)} m² and "
+            f"{number(float(planned))} mm as planned."
         ]
         for name, (share, _) in sorted(self.causes.items(), key=lambda each: -each[1][0]):
             if share >= _TOLD:

@@ -27,6 +27,7 @@ from shellform.net.net import Net
 from shellform.net.orientation import oriented_net
 from shellform.net.refusal import NoNet, Stalled
 from shellform.net.saved import net_document, save_net
+from shellform.quantities import number
 from shellform.records import stages
 from shellform.records.files import plain
 from shellform.records.progress import Event, Kind, Report
@@ -117,12 +118,12 @@ def labelled(found: FirstLook) -> dict[str, str]:
         "format": found.format,
         "unit": found.unit,
         "size": size_text(surface.size),
-        "area": f"{surface.area:.4g} m²",
+        "area": f"{number(surface.area, 4)} m²",
         "triangles": str(surface.triangles),
         "holes": str(surface.holes),
         "mended": surface.mended[0] if surface.mended else "nothing",
         **{f"mended {k}": text for k, text in enumerate(surface.mended[1:], 2)},
-        "largest curvature": f"{bent:.3g} 1/m, radius {1.0 / bent:.3g} m" if bent > 0.0 else "none",
+        "largest curvature": f"{number(bent)} 1/m, radius {number(1.0 / bent)} m" if bent > 0.0 else "none",
     }
     source = "in GFRP, strength/E = 255 MPa/40 GPa"
     if found.expected is not None:
@@ -130,7 +131,7 @@ def labelled(found: FirstLook) -> dict[str, str]:
         lines["freedoms to expect"] = f"about {found.expected.freedoms}"
         source = "equation 1, at the surface's largest curvature"
     largest = found.rod_radius_max
-    lines["largest rod radius"] = "any" if largest is None else f"at least {largest:.3g} m ({source})"
+    lines["largest rod radius"] = "any" if largest is None else f"at least {number(largest)} m ({source})"
     return lines
 
 
@@ -142,18 +143,18 @@ def labelled_net(found: Summary) -> dict[str, str]:
     lines = {
         "size": size_text(found.surface.size),
         "rods": f"{net.rods} at {net.spacing:g} m, with {net.crossings} crossings and {net.supports} supports",
-        "off the surface": f"{net.distance_max:.2g} m at most, {net.distance_mean:.2g} m in the mean",
+        "off the surface": f"{number(net.distance_max, 2)} m at most, {number(net.distance_mean, 2)} m in the mean",
         "off their spacing": f"{100.0 * net.spacing_error_max:.2f} % at most",
         "sharpest angle": f"{math.degrees(net.shear_angle_min):.3g}° between two rods",
-        "largest curvature": f"{net.curvature_max:.3g} 1/m of a rod",
-        "area without rods": f"{net.uncovered_area:.3g} m²",
+        "largest curvature": f"{number(net.curvature_max)} 1/m of a rod",
+        "area without rods": f"{number(net.uncovered_area)} m²",
     }
     if net.angle is not None:
         lines["angle of u rods"] = f"{math.degrees(net.angle):.4g}° against the x axis"
     lengths: dict[str, float] = {}
     for each in net.edges:
         lengths[each.kind] = lengths.get(each.kind, 0.0) + each.length
-    lines["edge"] = ", ".join(f"{length:.3g} m {kind}" for kind, length in lengths.items())
+    lines["edge"] = ", ".join(f"{number(length)} m {kind}" for kind, length in lengths.items())
     return lines | {f"note {k}": text for k, text in enumerate(net.notes, 1)}
 
 

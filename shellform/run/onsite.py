@@ -24,8 +24,7 @@ from shellform.errors import (
     require_known,
 )
 from shellform.gridshell.gridshell import Gridshell
-from shellform.quantities import PLACE_DEVIATION, TURN
-from shellform.records.words import number
+from shellform.quantities import PLACE_DEVIATION, TURN, newtons
 from shellform.run.folder import Run, read_run
 from shellform.run.site_sources import design_named, load_named, scan_under, scanned
 from shellform.site import calibration, erection, measurements, retensioning
@@ -272,8 +271,8 @@ def erect(
             f"largest rod stress {1e-6 * worst.stress:.0f} MPa, {worst.stress / done.strength:.2f} of the "
             f"strength, at {worst.share:.2f} of {worst.stage}; "
             f"{1e-6 * last.stress:.0f} MPa in the end",
-            f"largest cable tension {number(max(each.tension for each in done.steps))} N, largest force on a "
-            f"support {number(max(each.reaction for each in done.steps))} N",
+            f"largest cable tension {newtons(max(each.tension for each in done.steps))}, largest force on a "
+            f"support {newtons(max(each.reaction for each in done.steps))}",
             *([] if borne is None else [_scaffold(borne)]),
             *([_broken(worst.stage, borne, tighten_first)] if worst.stress > done.strength else []),
         ],
@@ -299,13 +298,13 @@ def _broken(stage: str, borne: Props | None, tighten_first: bool) -> str:
 def _scaffold(borne: Props) -> str:
     """What a scaffold bears."""
     held = (
-        f"holds up to {borne.pulled} of them down, where the grid would lift off, with up to {number(borne.pull)} N"
+        f"holds up to {borne.pulled} of them down, where the grid would lift off, with up to {newtons(borne.pull)}"
         if borne.pulled
         else "holds none of them down"
     )
     return (
-        f"the scaffold pushes crossings up with up to {number(borne.push)} N each and {held}; ropes draw rods' ends in "
-        f"with up to {number(borne.rope)} N"
+        f"the scaffold pushes crossings up with up to {newtons(borne.push)} each and {held}; ropes draw rods' ends in "
+        f"with up to {newtons(borne.rope)}"
     )
 
 

@@ -20,6 +20,7 @@ from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import Edges, stretches_of
 from shellform.net.net import Stretch
+from shellform.quantities import number
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.first_design import finished_design, first_design
 from shellform.run.first_edges import TUBES
@@ -211,7 +212,7 @@ def _text(
     angle = "as asked" if wish.angle is not None else "of those tried its rods bend least"
     bent = 1.0 / max(placed.net.quality.curvature_max, 1e-12)
     return f"""\
-# Proposed by `shellform new` for {json.dumps(file.name, ensure_ascii=False)}: {size_text(surface.size)}, {surface.area:.4g} m².
+# Proposed by `shellform new` for {json.dumps(file.name, ensure_ascii=False)}: {size_text(surface.size)}, {number(surface.area, 4)} m².
 # If that size is wrong, the unit is: run `shellform new` again with --unit. What was tried:
 {told}
 title = {json.dumps(title, ensure_ascii=False)}

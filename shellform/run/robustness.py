@@ -12,6 +12,7 @@ from shellform.arrays import Reals
 from shellform.case.limit_entries import RobustEntry
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
+from shellform.quantities import number
 from shellform.records.scattering import CauseRecord, RobustRecord, SampleRecord
 from shellform.reliability import robust
 from shellform.structure.elements.state import State
@@ -51,7 +52,7 @@ class Robustness:
         if told.misfit_mean is not None and told.misfit_deviation is not None:
             found.append(
                 f"Of {told.count} structures drawn and loaded {stand} stand, with a misfit of "
-                f"{told.misfit_mean:.3g} ± {told.misfit_deviation:.2g} m²."
+                f"{number(told.misfit_mean)} ± {number(told.misfit_deviation, 2)} m²."
             )
         if told.lost:
             found.append(

@@ -22,6 +22,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import CONCRETE, pressure
 from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
+from shellform.quantities import number
 from shellform.run.first_trial import NEEDED, STRESSED
 from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_usual, least_spacing, radius_for
 from shellform.run.way_out import COVERED
@@ -172,16 +173,16 @@ def refuse_size(surface: Surface) -> None:
     own = states_unit(Path(surface.source))  # which --unit doesn't change
     remedy = "Scale the file to the size that is meant."
     if taken and not own:
-        remedy = f"Give the file's unit: --unit {taken[0]} makes it {side * METRES[taken[0]]:.3g} m."
+        remedy = f"Give the file's unit: --unit {taken[0]} makes it {number(side * METRES[taken[0]])} m."
     elif taken or stated:
         said, meant = ("m", taken[0]) if taken else (stated[0], "m")
         how = "in the program that wrote the file, and export it anew" if own else f"by --unit {meant}"
         remedy = (
             f"If {said} was stated and {meant} was meant, state {meant} {how}: that makes it "
-            f"{side * METRES[meant] / METRES[said]:.3g} m. Else scale it to the size that is meant."
+            f"{number(side * METRES[meant] / METRES[said])} m. Else scale it to the size that is meant."
         )
     raise InputError(
-        f"is {x:.4g} × {y:.4g} × {z:.4g} m, which no gridshell is ({SMALLEST:g} to {LARGEST:g} m)",
+        f"is {number(x, 4)} × {number(y, 4)} × {number(z, 4)} m, which no gridshell is ({SMALLEST:g} to {LARGEST:g} m)",
         where="surface.unit",
         remedy=remedy,
     )

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Flags, Indices, Reals, Record, flags, reals
 from shellform.errors import InputError, how_many
+from shellform.quantities import number
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.solve.assembly import Assembly
@@ -143,8 +144,8 @@ def _in_millimetres(network: Network) -> list[str]:
     if slender < _SLENDER:
         return []
     return [
-        f"The nodes reach over {side:.4g} m, and beams are {slender:.2g} times as long as EA and EI make them thick: if "
-        f"millimetres were meant, write metres, {1e-3 * side:.4g} in place of {side:.4g}."
+        f"The nodes reach over {number(side, 4)} m, and beams are {number(slender, 2)} times as long as EA and EI make them thick: if "
+        f"millimetres were meant, write metres, {number(1e-3 * side, 4)} in place of {number(side, 4)}."
     ]
 
 
@@ -169,7 +170,7 @@ def _far_apart(network: Network) -> list[str]:
 
     stiff, soft = int(values.argmax()), int(np.where(there, values, np.inf).argmin())
     return [
-        f"{named(stiff)} ({values[stiff]:.1e} N/m) is {values[stiff] / values[soft]:.1e} times as stiff as "
+        f"{named(stiff)} ({number(values[stiff], 2)} N/m) is {number(values[stiff] / values[soft], 2)} times as stiff as "
         f"{named(soft)}; digits are lost."
     ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from shellform.quantities import number
 from shellform.study.engine import Manned
 from shellform.study.outcome import Status, Value
 from shellform.study.studies import StudyProgress
@@ -86,4 +87,4 @@ def _table(progress: StudyProgress) -> Any:
 
 
 def _cell(value: Value | None) -> str:
-    return "" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+    return "" if value is None else number(value, 4) if isinstance(value, float) else str(value)

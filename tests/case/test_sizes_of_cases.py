@@ -183,7 +183,7 @@ def test_a_limit_as_large_as_a_wrong_unit_s_is_told_how_it_limits_nothing(vault,
         ("optimise.misfit_rms_additional=1e3", "is 1000 m: more than the surface's larger side, so that it"),
         (
             "cable.force_max=1e9",
-            r"is 1e\+09 N: so much as no cable of 187 N bears, so that it limits nothing",
+            r"is 1 × 10⁹ N: so much as no cable of 187 N bears, so that it limits nothing",
         ),
     ],
 )
@@ -222,7 +222,11 @@ def test_shipped_cases_leave_no_doubt(vault):
 @pytest.mark.parametrize(
     ("case", "settings", "said"),
     [
-        (VAULT, ["load.force=6900"], "load.force is 6900 N: .*as 47 m of concrete. .*For 6900 mN write 6.9."),
+        (
+            VAULT,
+            ["load.force=6900"],
+            "load.force is 6\u202f900 N: .*as 47 m of concrete. .*For 6900 mN write 6.9.",
+        ),
         (VAULT, ["load.force=0.0069"], "load.force is 0.0069 N: 1.14 N/m², .*For 0.0069 kN write 6.9."),
         (
             VAULT,

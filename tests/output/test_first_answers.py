@@ -161,6 +161,11 @@ def test_what_supports_have_to_take_is_told_of_the_worst_load():
         told
         == "3 supports, held down with up to 350 N and pushed sideways by up to 125 N each, erected or loaded"
     )
+    loads["none"] = replace(MORE, uplift_max=1.44e6, thrust_max=23400.0)
+    assert (
+        "held down with up to 1\u202f440 kN and pushed sideways by up to 23.4 kN each"
+        in first_answers._stands_on(net, None, loads).detail
+    )
     del loads["none"], loads["design"]
     assert first_answers._stands_on(net, None, loads).detail == "3 supports"
 

@@ -18,9 +18,10 @@ from shellform.output.page.charts import line_chart
 from shellform.output.page.embed import embed
 from shellform.output.page.first_answers import answers
 from shellform.output.page.shown_run import ShownRun
+from shellform.quantities import number
 from shellform.records.check import Cell
 from shellform.records.summary import BuiltShapeRecord, StandingRecord, VerdictRecord
-from shellform.records.words import constraint_titles, number
+from shellform.records.words import constraint_titles
 from shellform.structure.elements.state import State
 from tests.net.edge_shells import barrel
 from tests.records.made import optimisation, summary
@@ -133,7 +134,7 @@ def test_the_mass_of_the_rods_is_told_where_their_density_is_known(shell, design
         (12345.0, "12\u202f345"),
         (100.0, "100"),
         (-2.5, "-2.5"),
-        (1e-7, "1e-07"),
+        (1e-7, "1 × 10⁻⁷"),
         (math.inf, "?"),
     ],
 )
@@ -169,13 +170,16 @@ def test_constraints_of_one_quantity_are_told_apart_by_their_loads():
     }
 
 
+LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+
 @pytest.mark.parametrize(("first", "last", "largest"), [(0, 60, 0.37), (200, 263, 410.0), (3, 9, 2.2e-4)])
 def test_the_axes_of_a_chart_are_divided_at_a_few_round_numbers_from_end_to_end(first, last, largest):
     at = range(first, last + 1)
     chart = line_chart("x", at, {"x": np.linspace(0.0, largest, len(at))})
     for anchor, low, high in (("middle", first, last), ("end", 0.0, largest)):
-        told = re.findall(rf'text-anchor="{anchor}">([-+.e\d]+)<', chart.svg)
-        values = [float(each) for each in told]
+        told = re.findall(rf'text-anchor="{anchor}">([-.×⁻⁰¹²³⁴⁵⁶⁷⁸⁹ \d]+)<', chart.svg)
+        values = [float(each.replace(" × 10", "e").translate(LOWERED)) for each in told]
         steps = np.diff(values)
         assert steps == pytest.approx(np.full(len(steps), steps[0])), told
         assert f"{steps[0]:.0e}"[0] in "125", steps[0]

@@ -1,6 +1,7 @@
 """The page of a study stands alone, tells what is in the table, and runs nothing but its own script."""
 
 import json
+import math
 import re
 from dataclasses import is_dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from shellform.output.page.study_page import (
     StudyContent,
     StudyRow,
     chosen,
+    number_text,
     rank_correlations,
     spread,
     study_page,
@@ -129,6 +131,8 @@ def test_columns_are_told_in_units_that_a_designer_uses():
     )
     for name in ("colour", "size"):
         assert f'select name="{name}"' in page
+    assert number_text(14400.0) == "14\u202f400", "not 1.44e+04"
+    assert (number_text(None), number_text(math.nan), number_text(12)) == ("–", "–", "12")
     unknown = summary_measure("net.something_new")
     assert (unknown.words, unknown.unit, unknown.factor) == ("net.something_new", "", 1.0)
 

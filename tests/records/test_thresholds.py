@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shellform.quantities import newtons, number
 from shellform.records import words
 from shellform.records.as_built import AsBuilt, critical_checks, falls, guide_checks, standing_checks
-from shellform.records.check import SLACK, Cell, Check, below, share_of
+from shellform.records.check import SLACK, Cell, Check, below, quantity, share_of
 from shellform.records.checks import Bounds, checks
 from shellform.records.optimisation import CableCountRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow
@@ -21,7 +22,6 @@ from shellform.records.words import (
     critical_words,
     far_off_words,
     load_title,
-    number,
     spent_words,
     standing_words,
 )
@@ -344,6 +344,8 @@ def test_numbers_of_remedies_are_rounded_to_the_side_on_which_they_hold():
     assert allow("cable.force_max", 21.0) == "Allow cable.force_max = 21."
     assert allow("cable.force_max", 21.01) == "Allow cable.force_max = 22."
     assert allow("limits.uplift", 0.0) == "Allow limits.uplift = 0."
+    assert allow("limits.thrust", 1.441e6) == "Allow limits.thrust = 1500000."
+    assert allow("limits.deviation", 4.11e-5) == "Allow limits.deviation = 0.000042."
 
 
 def test_numbers_are_told_with_three_digits_and_powers_of_ten_only_where_they_must():
@@ -352,11 +354,14 @@ def test_numbers_are_told_with_three_digits_and_powers_of_ten_only_where_they_mu
         0.001: "0.001",
         0.000999: "0.000999",
         0.00012345: "0.000123",
-        1.23e-5: "1.23e-05",
+        0.00009999: "0.0001",
+        1.23e-5: "1.23 × 10⁻⁵",
+        -3e-10: "-3 × 10⁻¹⁰",
         1234.0: "1\u202f234",
         999999.0: "999\u202f999",
-        1e6: "1e+06",
-        1.5e6: "1.5e+06",
+        1e6: "1\u202f000\u202f000",
+        1.5e6: "1\u202f500\u202f000",
+        2.5e9: "2.5 × 10⁹",
         -2.5: "-2.5",
         100.0: "100",
         0.5: "0.5",
@@ -364,6 +369,29 @@ def test_numbers_are_told_with_three_digits_and_powers_of_ten_only_where_they_mu
     assert {value: number(value) for value in told} == told
     assert number(np.inf) == number(np.nan) == "?"
     assert number(1.23456, 5) == "1.2346"
+
+
+def test_forces_are_told_in_newtons_kilonewtons_or_meganewtons_with_digits_in_groups():
+    told = {
+        0.0: "0 N",
+        4.62: "4.62 N",
+        9990.0: "9\u202f990 N",
+        14400.0: "14.4 kN",
+        -14400.0: "-14.4 kN",
+        1.44e6: "1\u202f440 kN",
+        2.3e7: "23 MN",
+    }
+    assert {force: newtons(force) for force in told} == told
+    assert newtons(2274530.0, 6) == "2\u202f274.53 kN"
+    assert quantity(14400.0, "N") == "14.4 kN"
+    assert quantity(14400.0, "mm") == "14\u202f400 mm"
+
+
+def test_an_unbalanced_force_is_told_as_a_person_writes_it(shell, designs):
+    made = checks({"polished": shell}, designs, summary(designs, "none", residual=3.2e-10), BOUNDS)
+    check = next(each for each in made if each.name == "In equilibrium under no load")
+    assert check.cells["polished"].found == "3 × 10⁻¹⁰"
+    assert check.limit == "unbalanced force up to a millionth of the largest"
 
 
 def test_words_of_the_shape_as_built_name_what_drives_it():

@@ -4,8 +4,8 @@ import math
 from pathlib import Path
 
 from shellform.case.limit_entries import LimitsEntry
+from shellform.quantities import newtons, number
 from shellform.records.summary import read_summary
-from shellform.records.words import number
 from shellform.run.folder import read_run
 from shellform.run.judged import run_checks
 from shellform.run.run import run_case
@@ -46,11 +46,11 @@ def test_every_limit_of_a_case_is_a_check_of_its_designs(tmp_path):
         f"{number(math.degrees(2e-6))} °",
         f"{number(3e-6)} N",
         f"{number(4e-6)} N",
-        f"at least {number(1e3)} N",
+        "at least 1\u202f000 N",
     ]
     told = run.summary.designs["initial"].loads.values()
-    assert found[LIMITS["thrust"]].found == f"{number(max(each.thrust_max for each in told))} N"
-    assert found[LIMITS["uplift"]].found == f"{number(max(each.uplift_max for each in told))} N"
+    assert found[LIMITS["thrust"]].found == newtons(max(each.thrust_max for each in told))
+    assert found[LIMITS["uplift"]].found == newtons(max(each.uplift_max for each in told))
     assert found[LIMITS["uplift"]].holds is not None  # all supports may press
     assert found[LIMITS["built_deviation"]].holds is None  # nothing was drawn yet
     open_ones = ("uplift", "built_deviation")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
+from shellform.quantities import number
 from shellform.structure.elements.beam import make_beams
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.network import Network, check_restrained, doubts, swinging
@@ -91,7 +92,7 @@ def test_stiffnesses_too_far_apart_are_told_with_both_elements_and_their_ratio(
 ):
     nodes = [[0, 0, 0], [2, 0, 0], [2, 2, 0]]
     (told,) = doubts(network(nodes, [[0, 1], [1, 2]], [[0, 2]], stiffness=stiffness, tie=tie))
-    assert told.startswith(f"{stiff} ({most:.1e} N/m) is {ratio:.1e} times as stiff as {soft};")
+    assert told.startswith(f"{stiff} ({number(most, 2)} N/m) is {number(ratio, 2)} times as stiff as {soft};")
 
 
 def test_a_million_of_millions_between_stiffnesses_is_too_much_and_what_adds_nothing_isn_t_counted():

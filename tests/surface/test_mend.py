@@ -348,7 +348,7 @@ def test_vertices_at_which_the_edge_meets_itself_are_parted_by_a_millionth_into_
     )  # fmt: skip
     faces = np.array([[0, 1, 2], [2, 1, 3], [1, 5, 4], [4, 7, 6]])
     found = mend._parted(Draft(points, faces, np.arange(24.0).reshape(8, 3)), 12.0)
-    assert found.notes == ("2 vertices at which the edge met itself were parted, by 1e-05 m",)
+    assert found.notes == ("2 vertices at which the edge met itself were parted, by 1 × 10⁻⁵ m",)
     assert len(found.points) == 10
     np.testing.assert_array_equal(found.points[:8], points)
     assert found.triangles.tolist() == [[0, 1, 2], [2, 1, 3], [8, 5, 9], [4, 7, 6]]

@@ -14,7 +14,7 @@ from html import escape
 
 import numpy as np
 
-from shellform.records.words import number
+from shellform.quantities import number
 
 _WIDTH, _HEIGHT = 460, 270  # of a chart, in its own units, and its margins:
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52, 12, 12, 40

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shellform.output.page.template import filled, part
+from shellform.quantities import number
 from shellform.records.summary import Summary
-from shellform.records.words import number
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from shellform.gridshell.edge_beams import lengths, mass
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
+from shellform.quantities import newtons, number
 from shellform.records.check import SLACK, Cell
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
 from shellform.records.words import (
@@ -24,7 +25,6 @@ from shellform.records.words import (
     critical_words,
     driven_words,
     listed,
-    number,
     shape_notes,
     standing_count_words,
 )
@@ -75,7 +75,7 @@ def answers(
         Answer(
             "How many cables?",
             f"{len(cables.ends)} of {len(shell.cable_ends)}",
-            f"{number(float(pull.max(initial=0.0)))} N at most in one, {number(float(pull.sum()))} N in all, "
+            f"{newtons(float(pull.max(initial=0.0)))} at most in one, {newtons(float(pull.sum()))} in all, "
             f"under the design load{_before(row, force_max)}{_slack(main, row)}",
         )
     )
@@ -152,7 +152,7 @@ def _stands_on(net: Net, more: LoadRecord | None, loads: Mapping[str, LoadRecord
     used = None if more is None else more.edge_utilisation_max
     beams = f"; edge beams, drawn dark, at {100 * used:.0f} % of their strength" if net.edges and used else ""
     needs = [
-        f"{what} {number(most)} N"
+        f"{what} {newtons(most)}"
         for what, most in (
             ("held down with up to", max((each.uplift_max or 0.0 for each in loads.values()), default=0.0)),
             (

@@ -27,6 +27,7 @@ from shellform.output.page.shown_run import ShownRun
 from shellform.output.page.template import filled, part
 from shellform.output.page.view_data import ViewedShell, controls, view_data
 from shellform.output.pictures.colours import VIRIDIS
+from shellform.quantities import number
 from shellform.records import words
 from shellform.records.check import UNASKED, Cell, Check, Subject
 from shellform.records.summary import Summary
@@ -58,7 +59,7 @@ def html(runs: Sequence[ShownRun], versions: Mapping[str, str]) -> str:
         style=part("look.css") + part("style.css"),
         script="(() => {\n" + "\n".join(part(name) for name in (*VIEW, "tables.js", "page.js")) + "\n})();",
         data={"viridis": VIRIDIS, "runs": [view_data(viewed(run)) for run in runs]},
-        number=words.number,
+        number=number,
     )
 
 

@@ -22,6 +22,7 @@ from shellform.output.page.measures import Measure
 from shellform.output.page.template import filled, part
 from shellform.output.pictures.colours import VIRIDIS
 from shellform.problem.paths import deviations
+from shellform.quantities import number
 from shellform.structure.elements.state import State
 
 MOST_ROWS = 4000  # that are drawn; the front is always among them
@@ -198,7 +199,7 @@ def number_text(value: Any) -> str:
     """A number at four digits; a dash where there is none."""
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return "–"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return number(value, 4) if isinstance(value, float) else str(value)
 
 
 def _label(name: str, measure: Measure) -> str:
@@ -209,8 +210,8 @@ def _label(name: str, measure: Measure) -> str:
 
 def _scaled(value: Any, measure: Measure) -> Any:
     """A number in the measure's unit; what is no number as it is."""
-    number = _number(value)
-    return None if number is None else _number(number * measure.factor) if measure.factor != 1.0 else number
+    plain = _number(value)
+    return None if plain is None else _number(plain * measure.factor) if measure.factor != 1.0 else plain
 
 
 def _number(value: Any) -> float | int | None:

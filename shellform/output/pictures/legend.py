@@ -18,6 +18,7 @@ from shellform.arrays import Reals, Record
 from shellform.errors import how_many
 from shellform.output.pictures.colours import VIRIDIS
 from shellform.output.pictures.panel import Panel, Scale
+from shellform.quantities import number
 
 Colours = NDArray[np.uint8]
 """Red, green, blue (n, 3)."""
@@ -91,7 +92,7 @@ def title(panel: Panel, scale: Scale, size: tuple[int, int]) -> tuple[Word, ...]
     taut = panel.cable_forces > 0.0
     if taut.any():
         label, size_of = _newtons(scale.force)
-        caption += f"; {how_many(int(taut.sum()), 'cable', 'cables')}, {panel.cable_forces.max() / size_of:.3g} {label} at most"
+        caption += f"; {how_many(int(taut.sum()), 'cable', 'cables')}, {number(float(panel.cable_forces.max()) / size_of)} {label} at most"
     line = scale.letters
     return (
         Word(

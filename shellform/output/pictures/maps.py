@@ -20,6 +20,7 @@ from shellform.net.net import Net
 from shellform.net.quality import shear_angles
 from shellform.output.pictures.panel import Panel, marked_nodes
 from shellform.problem.paths import deviations
+from shellform.quantities import number
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -110,7 +111,7 @@ def _shear(shell: Gridshell, design: Design, state: State) -> Map:
 def _mode(shell: Gridshell, design: Design, state: State) -> Map:
     found = modes(assemble(shell.network(design)), state, 1)
     shift = found.shapes[0, :, :3] / np.linalg.norm(found.shapes[0, :, :3], axis=1).max()
-    note = f": softest mode, {found.stiffness[0]:.3g} N/m"
+    note = f": softest mode, {number(float(found.stiffness[0]))} N/m"
     place = sunk(state.positions, shift)
     return Map(np.linalg.norm(shift, axis=1), "amplitude over the largest", ("", 1.0), place, note)
 

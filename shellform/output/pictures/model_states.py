@@ -10,6 +10,7 @@ from shellform.arrays import Reals
 from shellform.output.pictures import render
 from shellform.output.pictures.maps import AMPLITUDE
 from shellform.output.pictures.panel import Look, Panel
+from shellform.quantities import number
 from shellform.structure.answers.analysis import Analysis
 from shellform.written import make_folder
 
@@ -25,7 +26,7 @@ def draw_analysis(analysis: Analysis, folder: str | Path) -> list[Path]:
     files = [
         _draw(
             analysis,
-            f"{name}: {1e3 * moved.max():.4g} mm at most",
+            f"{name}: {number(float(1e3 * moved.max()), 4)} mm at most",
             "displacement",
             place,
             moved,
@@ -44,7 +45,7 @@ def draw_analysis(analysis: Analysis, folder: str | Path) -> list[Path]:
         for k, (stiffness, shape) in enumerate(
             zip(analysis.modes.stiffness, analysis.modes.shapes, strict=True), 1
         ):
-            title = f"mode {k}, stiffness {stiffness:.4g} N/m"
+            title = f"mode {k}, stiffness {number(float(stiffness), 4)} N/m"
             files.append(_mode(analysis, title, place, shape, target / f"mode-{k}.png"))
     return files
 

@@ -28,6 +28,7 @@ from shellform.errors import InputError
 from shellform.output.pictures.curves import read_history as read_history
 from shellform.output.pictures.legend import Ramp, Word
 from shellform.output.pictures.panel import FORMATS
+from shellform.quantities import number
 from shellform.records.words import constraint_titles
 from shellform.written import path_to_write, whole
 
@@ -95,7 +96,7 @@ def constraint_history(
         decades = [k * 10.0**n for n in range(int(np.log10(highest)) + 1) for k in (1, 2, 5)]
         axes.yaxis.set_major_locator(FixedLocator([-5.0, -2.0, -1.0, -0.5, 0.0, 0.5, *decades]))
         axes.yaxis.set_minor_locator(NullLocator())
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
         top = 1.5 * highest
     else:
         top = max(1.15 * highest, 0.15)

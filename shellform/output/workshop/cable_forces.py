@@ -9,7 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.records.words import exceeds, listed, number
+from shellform.quantities import newtons
+from shellform.records.words import exceeds, listed
 
 
 def force_notes(pulls: Mapping[str, Reals], before: str, limit: float | None) -> tuple[str, ...]:
@@ -18,11 +19,11 @@ def force_notes(pulls: Mapping[str, Reals], before: str, limit: float | None) ->
     if not len(pulls[before]):
         return ()
     most = {name: int(np.argmax(pull)) for name, pull in pulls.items()}
-    found = ", ".join(f"{name} {number(float(pulls[name][k]))} N (C{k})" for name, k in most.items())
+    found = ", ".join(f"{name} {newtons(float(pulls[name][k]))} (C{k})" for name, k in most.items())
     told = [f"Largest force: {found}."]
     if limit is not None:
         above = [k for k, pull in enumerate(pulls[before].tolist()) if exceeds(pull, limit)]
-        told[0] += f" The limit, {number(limit)} N, counts under load alone (cable.force_max)."
+        told[0] += f" The limit, {newtons(limit)}, counts under load alone (cable.force_max)."
         if above:
             told.append(
                 f"Before any load more than that: {listed([f'C{k}' for k in above])}. Choose cables, ends and turnbuckles "

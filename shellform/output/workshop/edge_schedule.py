@@ -11,6 +11,7 @@ from shellform.gridshell.catalogue import label
 from shellform.gridshell.edge_beams import EDGE, lengths
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.net import EdgeLine, Net
+from shellform.quantities import number
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 from shellform.tables import Table, Value
@@ -56,7 +57,7 @@ def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], ro
     edge = shell.edge
     notes = tuple(
         f"{name}: {label(edge.section)}, E {edge.section.material.young / 1e9:.4g} GPa, {length:.3f} m{', closed' if line.closed else ''}"
-        + (f", {mass_per_length(edge.section) * length:.3g} kg" if edge.section.material.density else "")
+        + (f", {number(mass_per_length(edge.section) * length)} kg" if edge.section.material.density else "")
         + ". It is made in its final curve, and rods are clamped to it once they are bent."
         for name, line, length in zip(edge_names(net), net.edges, lengths(net), strict=True)
         if edge is not None

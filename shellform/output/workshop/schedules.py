@@ -46,6 +46,7 @@ from shellform.output.workshop.edge_schedule import edge_names, edge_table
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.splice_schedule import cutting_notes, splice_table
 from shellform.output.workshop.turnbuckles import cutting_note, turnbuckle_notes
+from shellform.quantities import newtons
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -247,7 +248,7 @@ def cables(built: Built) -> Table:
         columns[f"{name}: force [N]"] = pulls[name]
     rows = tuple((f"C{k}", *(values[k].item() for values in columns.values())) for k in range(len(pairs)))
     notes = (
-        f"Lengths between the pins' axes. {how_many(len(pairs), 'cable', 'cables')}, EA = {shell.cable.stiffness:g} N. A force of "
+        f"Lengths between the pins' axes. {how_many(len(pairs), 'cable', 'cables')}, EA = {newtons(shell.cable.stiffness, 6)}. A force of "
         "0: slack at that stage.",
         *force_notes(pulls, _stage("none"), built.force_limit),
         *cutting_of_cables(built),

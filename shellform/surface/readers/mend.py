@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from shellform import quantities
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Draft, choosable
@@ -215,7 +216,8 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
         )
     kept = replace(draft, triangles=draft.triangles[label == order[piece - 1]])
     return noted(
-        without_unused(kept)[0], f"piece {piece} of {count} was taken, {area[order[piece - 1]]:.3g} m²"
+        without_unused(kept)[0],
+        f"piece {piece} of {count} was taken, {quantities.number(area[order[piece - 1]])} m²",
     )
 
 
@@ -295,7 +297,7 @@ def _parted(draft: Draft, size: float) -> Draft:
         "vertex at which the edge met itself was parted",
         "vertices at which the edge met itself were parted",
     )
-    return noted(parted, f"{met}, by {_PARTED * size:.1g} m")
+    return noted(parted, f"{met}, by {quantities.number(_PARTED * size, 1)} m")
 
 
 def noted(draft: Draft, note: str) -> Draft:

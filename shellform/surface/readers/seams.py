@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import how_many
+from shellform.quantities import number
 from shellform.surface.readers.draft import Draft
 
 _GAP = 0.1  # of the mean length of open edges
@@ -50,14 +51,14 @@ def sewn(draft: Draft, size: float) -> Draft:
             *notes,
             how_many(
                 joined,
-                f"pair of vertices across a gap of {gap:.2g} m was joined",
-                f"pairs of vertices across a gap of up to {gap:.2g} m were joined",
+                f"pair of vertices across a gap of {number(gap, 2)} m was joined",
+                f"pairs of vertices across a gap of up to {number(gap, 2)} m were joined",
             ),
         )
     if cut:
         notes = (
             *notes,
-            f"{cut} vertices on another face's edge (T-junctions, up to {off:.2g} m off) were taken into it",
+            f"{cut} vertices on another face's edge (T-junctions, up to {number(off, 2)} m off) were taken into it",
         )
     return replace(draft, notes=notes)
 

@@ -26,6 +26,7 @@ from scipy.spatial import cKDTree
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import how_many
+from shellform.quantities import number
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.sides import shared_edges
 from shellform.surface.shape.target import across_edges, closed_loops, rough_normals
@@ -122,7 +123,7 @@ def _told(draft: Draft, placed: Reals, faces: Indices, track: Tree, edges: int) 
         points=placed[used],
         triangles=(np.cumsum(used) - 1)[faces],
         normals=given,
-        notes=(*draft.notes, f"{told}, by {most:.2g} m at most"),
+        notes=(*draft.notes, f"{told}, by {number(most, 2)} m at most"),
     )
 
 

@@ -34,7 +34,12 @@ function ticks(low, high) {
 
 const shade = (share) => data.colours[Math.min(Math.floor(share * data.colours.length), data.colours.length - 1)];
 
-const number = (v) => (typeof v !== "number" ? "–" : String(Number(v.toPrecision(4))).replace("-", "−"));
+const raised = (power) => [...String(power)].map((sign) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(sign)]).join("");
+const plain = (v) => { // as a person writes it: a power of ten where JavaScript would write 1e-7
+  const [digits, power] = String(Number(v.toPrecision(4))).split("e");
+  return power === undefined ? digits : `${digits} × 10${raised(Number(power))}`;
+};
+const number = (v) => (typeof v !== "number" ? "–" : plain(v).replace("-", "−"));
 
 function scatter() {
   const box = document.getElementById("scatter"), form = document.forms[0], W = 900, H = 460, L = 84, R = 32, T = 14, B = 48;
