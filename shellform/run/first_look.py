@@ -210,6 +210,8 @@ def net_alone(
             remedy="Choose another --output for the net alone.",
         )
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
+    for mended in surface.mended:
+        report(Event("surface", mended, Kind.NOTE))
     report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
     settings = NetSettings(spacing=spacing, gap=gap or usual_gap(spacing))
 

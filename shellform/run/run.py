@@ -261,6 +261,8 @@ def _surface(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
         workspace.say("surface", doubt, Kind.NOTE)
     if keep:
         return _Ended(parts, summary)
+    for mended in surface.mended:
+        workspace.say("surface", mended, Kind.NOTE)
     save_surface(workspace.path("surface.npz"), surface)
     return _Ended(parts, replace(summary, surface=surface_record(surface, workspace.case.surface.file)))
 

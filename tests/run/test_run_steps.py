@@ -12,6 +12,7 @@ from shellform.case.case import make_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.catalogue import read_catalogue
 from shellform.net.refusal import Stalled
+from shellform.records.progress import Kind
 from shellform.records.stages import STAGES
 from shellform.records.summary import VerdictRecord
 from shellform.run import run as module
@@ -40,6 +41,25 @@ def test_what_a_stage_and_those_after_it_find_anew_is_outdated_and_nothing_befor
     assert (left.verdict is None) == (at <= STAGES.index("safety"))
     for each in left.designs.values():
         assert (each.loads["design"].critical_factor is None) == (at <= STAGES.index("safety"))
+
+
+def test_what_was_mended_in_the_surface_is_told_in_the_run_that_reads_it_and_not_again(monkeypatch, tmp_path):
+    mended = (
+        "2 edges were toothed and were smoothed, by 0.013 m at most",
+        "coordinates count from (7, 8, 0) m",
+    )
+    surface, told = SimpleNamespace(mended=mended), []
+    workspace = SimpleNamespace(
+        case=SimpleNamespace(surface=SimpleNamespace(file="hall.obj")),
+        say=lambda stage, text, kind: told.append((stage, text, kind)),
+        path=tmp_path.joinpath,
+    )
+    monkeypatch.setattr(module, "doubts", lambda case, surface: ())
+    monkeypatch.setattr(module, "save_surface", lambda path, surface: None)
+    monkeypatch.setattr(module, "surface_record", lambda surface, file: None)
+    for keep in (False, True):
+        module._surface(workspace, SimpleNamespace(surface=surface), summary(("polished",)), keep)
+    assert told == [("surface", each, Kind.NOTE) for each in mended]
 
 
 def test_the_stages_that_are_wanted_end_with_the_one_that_is_named_and_a_sketch_has_fewer():
