@@ -58,9 +58,15 @@ def render(
     force_limit: Annotated[
         float | None, typer.Option(help="End of the cables' colour scale, N; left out: the largest force.")
     ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the pictures; left out: RUN/figures, whose pictures the page shows."),
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Draw maps of a run, or a film."""
+    """Draw maps of a run, or a film; with --output beside those that its page shows, not in their place."""
+    from dataclasses import replace
+
     from shellform.run.figures import draw_designs, wish
     from shellform.run.folder import read_run
 
@@ -72,6 +78,7 @@ def render(
         kind=kind, film=film, by=by, tighten_first=tighten_first,
         force_limit=force_limit, width_mm=width_mm, dpi=dpi, font_size=font_size,
     )  # fmt: skip
+    asked = replace(asked, folder=output)
     if film is None:
         files = draw_designs(found, asked)
     else:

@@ -56,7 +56,7 @@ class Wish:
       for the utilisation, what the rods bear for their curvature, else the largest.
     - `force_limit`, N, of the cables' colours; 0: the largest.
     - `paper` that it is for; None: a screen. `by`, `tighten_first`: as `erect` takes them, of a film.
-    - `endings` of the files; the rest as in panel.py.
+    - `endings` of the files, in `folder` (None: the run's figures/); the rest as in panel.py.
     """
 
     design: str | None = None
@@ -72,6 +72,7 @@ class Wish:
     paper: Paper | None = None
     by: str | None = None
     tighten_first: bool = False
+    folder: Path | None = None
 
 
 def wish(
@@ -223,7 +224,7 @@ def draw_failure(run: Run) -> list[Path]:
     return [file]
 
 
-def draw_histories(run: Run, *, ending: str = ".png") -> list[Path]:
+def draw_histories(run: Run, *, ending: str = ".png", folder: Path | None = None) -> list[Path]:
     """The objective with its terms and cables, and the constraints, at each accepted design; .png, .svg or
     .pdf.
     """
@@ -239,7 +240,8 @@ def draw_histories(run: Run, *, ending: str = ".png") -> list[Path]:
     at = [float(step.evaluation) for step in steps]
     terms = {name: [step.terms[name] for step in steps] for name in steps[0].terms}
     constraints = {name: [step.constraints[name] for step in steps] for name in steps[0].constraints}
-    files = [make_folder(run.folder / "figures") / f"{name}{ending}" for name in ("objective", "constraints")]
+    figures = make_folder(folder or run.folder / "figures")
+    files = [figures / f"{name}{ending}" for name in ("objective", "constraints")]
     plots.objective_history(files[0], at, terms, cables=[float(step.cables) for step in steps])
     plots.constraint_history(files[1], at, constraints)
     return files
@@ -270,9 +272,9 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard
     from shellform.output.pictures.panel import Look
 
     asked = wish or Wish()
-    figures = make_folder(run.folder / "figures")
+    figures = make_folder(asked.folder or run.folder / "figures")
     if asked.quantity == "history":
-        return draw_histories(run, ending=asked.endings[0])
+        return draw_histories(run, ending=asked.endings[0], folder=asked.folder)
     if asked.quantity == "spring":  # what the springs still pull is the net's, whatever the design
         look = Look(
             size=asked.size or _USUAL,
@@ -289,10 +291,8 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard
     render.pictures(files, [titled(run, panel) for row in rows for panel in row], look)
     if len(files) > 1:
         shown = [row for name, row in zip(names, rows, strict=True) if name in _compared(run) or asked.design]
-        page = (
-            figures
-            / f"{_stem(asked, 'deviations' if asked.quantity == 'deviation' else 'all')}{asked.endings[0]}"
-        )
+        stem = "deviations" if asked.quantity == "deviation" else "all"
+        page = figures / f"{_stem(asked, stem)}{asked.endings[0]}"
         render.sheet(
             page,
             shown,

@@ -54,7 +54,9 @@ def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = unheard) -> l
         panels = _erection(run, name, wish, report)
         stem = f"erection-{name}"
     look = look_of(run, replace(wish, size=wish.size or _SIZE), panels)
-    files = [make_folder(run.folder / "figures") / f"{stem}{ending}" for ending in wish.endings]
+    files = [
+        make_folder(wish.folder or run.folder / "figures") / f"{stem}{ending}" for ending in wish.endings
+    ]
     report(Event("film", f"drawing {len(panels)} frames"))
     render.film(files, [titled(run, panel) for panel in panels], look)
     return files

@@ -36,6 +36,18 @@ def names(files: list[Path]) -> list[str]:
     return [file.name for file in files]
 
 
+def test_pictures_in_a_folder_of_their_own_leave_those_of_the_page_as_they_are(run, tmp_path):
+    small = Wish("initial", "design", size=(320, 200))
+    (shown,) = draw_designs(run, small)
+    before = shown.read_bytes()
+    asked = replace(small, size=(240, 160), folder=tmp_path / "print")
+    (printed,) = draw_designs(run, asked)
+    assert printed == tmp_path / "print" / shown.name
+    assert printed.read_bytes() != before
+    assert shown.read_bytes() == before
+    assert shown.parent == run.folder / "figures"
+
+
 def test_all_designs_under_all_loads_are_drawn_with_a_sheet_of_them(run):
     files = draw_run(run.folder, Wish(size=(320, 200)))
     designs = [
