@@ -19,6 +19,7 @@ from shellform.arrays import Reals, Record, indices, reals
 from shellform.errors import InputError, require_number
 from shellform.structure.elements.sections import Section, stiffness
 from shellform.structure.model import Model, parse_model
+from shellform.structure.network import repeated
 
 _FIXED = {"pinned": [True] * 3 + [False] * 3, "fixed": [True] * 6}
 Rod = Section | Sequence[float] | Reals
@@ -63,6 +64,15 @@ def from_arrays(
         indices(name, ends, (None, 2), below=len(places))
         for name, ends in (("rods", rods), ("cables", cables))
     )
+    for name, ends in (("rods", beams), ("cables", ties)):
+        again, earlier = repeated(ends)
+        if len(again):
+            raise InputError(
+                f"joins the nodes that {name}[{earlier[0]}] joins, which would count it twice",
+                where=f"{name}[{again[0]}]",
+                value=ends[again[0]].tolist(),
+                remedy="Leave one of the two out; where two are meant side by side, give a networkx.MultiGraph.",
+            )
     rest = None if rest_lengths is None else reals("rest_lengths", rest_lengths, (None,))
     if rest is not None and len(rest) != len(ties):
         raise InputError(

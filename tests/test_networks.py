@@ -254,6 +254,14 @@ def test_a_section_gives_the_stiffnesses_and_the_model_is_solved():
             "four stiffnesses.*is its .section",
         ),
         (
+            lambda: sf.networks.from_arrays(NODES, rods=[[0, 1], [1, 2], [1, 0]], rod=ROD),
+            r"rods\[2\]: joins the nodes that rods\[0\] joins, which would count it twice.*MultiGraph",
+        ),
+        (
+            lambda: sf.networks.from_arrays(NODES, cables=[[1, 2], [0, 1], [0, 1]], cable=187.0),
+            r"cables\[2\]: joins the nodes that cables\[1\] joins",
+        ),
+        (
             lambda: sf.networks.from_arrays(NODES, cables=[[0, 1]], cable=sf.Cable(187.0)),
             "cable: must be a number",
         ),

@@ -98,11 +98,13 @@ def connected(count: int, ends: Indices) -> tuple[int, Indices]:
 
 
 def doubts(network: Network) -> list[str]:
-    """What is allowed but rarely meant, a sentence each: nodes in one place, stiffnesses too far apart, rest
-    lengths far from the distance of their nodes, nodes in millimetres, straight rods that nothing keeps from
-    spinning about their own axis (that spin is held in the solution)."""
+    """What is allowed but rarely meant, a sentence each: nodes in one place, elements side by side,
+    stiffnesses too far apart, rest lengths far from the distance of their nodes, nodes in millimetres,
+    straight rods that nothing keeps from spinning about their own axis (that spin is held in the
+    solution)."""
     return [
         *_coincident(network),
+        *_side_by_side(network),
         *_far_apart(network),
         *_misfitting(network),
         *_in_millimetres(network),
@@ -131,6 +133,27 @@ def _coincident(network: Network) -> list[str]:
         f"{how_many(int(same.sum()), 'node lies', 'nodes lie')} where another one does, nodes[{pair[0]}] and "
         f"nodes[{pair[1]}] the first; they don't touch."
     ]
+
+
+def repeated(ends: Indices) -> tuple[Indices, Indices]:
+    """Of elements between `ends` (k, 2), in either direction, those (r,) that join the two nodes of an
+    earlier one, and the first (r,) that does."""
+    _, first, of = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_inverse=True)
+    earlier = first[of.ravel()]
+    again = np.flatnonzero(earlier != np.arange(len(ends)))
+    return again, earlier[again]
+
+
+def _side_by_side(network: Network) -> list[str]:
+    told = []
+    for name, ends in (("beam", network.beams.ends), ("cable", network.cables.ends)):
+        again, earlier = repeated(ends)
+        if len(again):
+            told.append(
+                f"{how_many(len(again), f'{name} joins', f'{name}s join')} two nodes that another one joins, "
+                f"{name}s[{again[0]}] beside {name}s[{earlier[0]}] the first; all count."
+            )
+    return told
 
 
 def _in_millimetres(network: Network) -> list[str]:

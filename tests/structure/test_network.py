@@ -69,6 +69,18 @@ def test_a_part_that_could_drift_off_is_told_with_its_size_its_first_node_and_th
     check_restrained(network(nodes, rods, cables, {0: ALL, 3: [True] * 3 + [False] * 3}))
 
 
+def test_elements_that_join_the_same_two_nodes_in_either_direction_are_counted_and_the_first_pair_named():
+    nodes = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 1]]
+    twice = network(nodes, [[0, 1], [1, 2], [2, 1], [2, 3], [0, 1]], [[0, 2], [2, 0]], held={0: ALL})
+    told = [each for each in doubts(twice) if "all count" in each]
+    assert told == [
+        "2 beams join two nodes that another one joins, beams[2] beside beams[1] the first; all count.",
+        "1 cable joins two nodes that another one joins, cables[1] beside cables[0] the first; all count.",
+    ]
+    once = network(nodes, [[0, 1], [1, 2], [2, 3]], [[0, 1], [1, 2]], held={0: ALL})
+    assert not [each for each in doubts(once) if "all count" in each], "a cable beside a rod is usual"
+
+
 def test_nodes_in_one_place_are_counted_and_the_first_pair_named():
     nodes = [[0, 0, 0], [1, 0, 0], [1, 2, 0], [1, 0, 0], [0, 2, 1]]
     beside = network(nodes, [[0, 1], [1, 2], [0, 3], [0, 4]], held={0: ALL})
