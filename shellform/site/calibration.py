@@ -32,6 +32,7 @@ from shellform.gridshell.gridshell import Design, Gridshell, Joint
 from shellform.net.grid import CONNECTOR
 from shellform.problem.paths import follow
 from shellform.site.identifiability import Identifiability, identifiability, nuisance
+from shellform.site.markers import Markers, markers_of
 from shellform.site.measurements import check_noise
 from shellform.site.scans import Match, Scan, apart, distances, laid
 from shellform.structure.answers.sensitivity import by_stiffness, respond, state_by_design, stiffness_rate
@@ -54,17 +55,17 @@ _SETTLED = 1e-5  # relative change of the residual norm or of the logarithms at 
 @dataclass(frozen=True, eq=False)
 class Calibration(Record):
     """The calibrated `joint`; which parameters were `fitted` and which `held` at the start.
-    `identifiability`: what the data tell, with the noise or the residuals, whichever are larger. `nodes`
-    (m,): the markers'; `matches` of the scans (s). `before`, `after` (m, s), m: distances of markers from the
-    model with the start's and the calibrated joint, NaN where missing; `residual`, m: a coordinate's standard
-    deviation. `states`: the calibrated model's. `evaluations` of all load states that it took; `rejected`:
-    trials off the branch."""
+    `identifiability`: what the data tell, with the noise or the residuals, whichever are larger. `markers`
+    (m,) with their names; `matches` of the scans (s). `before`, `after` (m, s), m: distances of markers from
+    the model with the start's and the calibrated joint, NaN where missing; `residual`, m: a coordinate's
+    standard deviation. `states`: the calibrated model's. `evaluations` of all load states that it took;
+    `rejected`: trials off the branch."""
 
     joint: Joint
     fitted: tuple[str, ...]
     held: tuple[str, ...]
     identifiability: Identifiability
-    nodes: Indices
+    markers: Markers
     matches: tuple[Match, ...]
     before: Reals
     after: Reals
@@ -82,9 +83,7 @@ class Calibration(Record):
         result += self.identifiability.sentences()
         for number, each in enumerate(self.matches, 1):
             if len(each.missing):
-                result.append(
-                    f"Scan {number}: no point for nodes {', '.join(map(str, self.nodes[each.missing]))}."
-                )
+                result.append(f"Scan {number}: no point for {self.markers.called(each.missing)}.")
             if len(each.outliers):
                 result.append(
                     f"Scan {number}: points {', '.join(map(str, each.outliers))} belong to no marker."
@@ -98,15 +97,15 @@ class Calibration(Record):
         """
         scans = self.after.shape[1]
         heads = [name for k in range(1, scans + 1) for name in (f"{k} start", str(k))]
-        both = 1e3 * np.stack([self.before, self.after], axis=2).reshape(len(self.nodes), -1)
+        both = 1e3 * np.stack([self.before, self.after], axis=2).reshape(len(self.before), -1)
         rows: list[tuple[Value, ...]] = [
-            (number, int(node), *("" if np.isnan(each) else f"{each:.3f}" for each in row))
-            for number, (node, row) in enumerate(zip(self.nodes, both, strict=True), 1)
+            (number, *place, *("" if np.isnan(each) else f"{each:.3f}" for each in row))
+            for number, (place, row) in enumerate(zip(self.markers.places(), both, strict=True), 1)
         ]
         for name, measure in (("mean", np.mean), ("max", np.max)):
             seen = [column[np.isfinite(column)] for column in both.T]
-            rows.append((name, "", *(f"{measure(each):.3f}" if len(each) else "" for each in seen)))
-        return table_text(Table("calibration", ("pos.", "node", *heads), tuple(rows)))
+            rows.append((name, "", "", "", *(f"{measure(each):.3f}" if len(each) else "" for each in seen)))
+        return table_text(Table("calibration", ("pos.", "node", "crossing", "rod", *heads), tuple(rows)))
 
 
 def foresee(
@@ -196,7 +195,7 @@ def calibrate(
         fitted=fitted,
         held=tuple(name for name in first if name not in fitted),
         identifiability=fit.identifiability(first, max(noise, deviation)),
-        nodes=markers,
+        markers=markers_of(shell.net.grid, markers),
         matches=tuple(matches),
         before=before,
         after=distances(scans, matches, states, markers),

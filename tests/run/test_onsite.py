@@ -213,8 +213,22 @@ def test_scans_become_connector_stiffness(folder, run, tmp_path):
     assert joint["bending"] == pytest.approx(0.9 * shell.joint.bending, rel=0.03)
     assert joint["axial"] == shell.joint.axial
     assert "axial was held" in result.stdout
+    with (tmp_path / "calibration.csv").open(encoding="utf-8-sig", newline="") as table:
+        rows = list(csv.DictReader(table))[: len(marks)]
+    upper = {int(node): k for k, node in enumerate(crossings)}
+    assert [(int(row["node"]), int(row["crossing"])) for row in rows] == [
+        (m, upper[m]) for m in marks.tolist()
+    ]
+    for row in rows:  # as the drawings name its upper rod
+        direction, number = row["rod"][0], int(row["rod"][1:])
+        rod = shell.net.grid.rods[number]
+        assert direction == "V"
+        assert rod.direction == "v"
+        assert int(row["node"]) in rod.nodes
     assert (
-        (tmp_path / "calibration.csv").read_text(encoding="utf-8").startswith("pos.,node,1 start,1,2 start,2")
+        (tmp_path / "calibration.csv")
+        .read_text(encoding="utf-8")
+        .startswith("pos.,node,crossing,rod,1 start,1,2 start,2")
     )
     # The same from the case file alone.
     told = onsite.calibrate(

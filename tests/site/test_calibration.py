@@ -94,7 +94,7 @@ def test_planted_connector_stiffness_is_recovered_within_2_percent_from_42_shuff
     assert np.isnan(found.after[found.matches[1].missing, 1]).all()
     rows = found.table().splitlines()
     assert len(rows) == 1 + 42 + 2
-    mean = [float(each or "nan") for each in rows[-2].split(",")[2:]]
+    mean = [float(each or "nan") for each in rows[-2].split(",")[4:]]
     assert mean[1] == pytest.approx(1e3 * np.nanmean(found.after[:, 0]), abs=1e-3)
     assert all(
         after < before or np.isnan(before) for before, after in zip(mean[0::2], mean[1::2], strict=True)

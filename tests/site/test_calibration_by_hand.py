@@ -8,6 +8,7 @@ import pytest
 import shellform as sf
 from shellform.site import calibration
 from shellform.site.calibration import Calibration
+from shellform.site.markers import Markers
 
 JOINT = sf.Joint(axial=100.0, torsion=2.0, bending=5.0, gap=0.01)
 PLACES = np.random.default_rng(0).normal(size=(4, 3))
@@ -18,14 +19,19 @@ def test_the_table_has_millimetres_of_both_models_their_means_and_their_largest_
     before = np.array([[0.003, 0.001], [0.005, np.nan]])
     after = np.array([[0.001, np.nan], [0.0005, np.nan]])
     made = Calibration(
-        JOINT, (), (), None, np.array([7, 4]), (), before, after, 0.0, (), 0, 0
+        JOINT, (), (), None, Markers(np.array([7, 4]), np.array([3, -1]), ("V5", "U1")), (), before, after, 0.0, (), 0, 0
     )  # fmt: skip
     rows = made.table().splitlines()
-    assert rows[0] == "pos.,node,1 start,1,2 start,2"
-    assert rows[1] == "1,7,3.000,1.000,1.000,"
-    assert rows[2] == "2,4,5.000,0.500,,"
-    assert rows[3] == "mean,,4.000,0.750,1.000,"
-    assert rows[4] == "max,,5.000,1.000,1.000,"
+    assert rows[0] == "pos.,node,crossing,rod,1 start,1,2 start,2"
+    assert rows[1] == "1,7,3,V5,3.000,1.000,1.000,"
+    assert rows[2] == "2,4,,U1,5.000,0.500,,"
+    assert rows[3] == "mean,,,,4.000,0.750,1.000,"
+    assert rows[4] == "max,,,,5.000,1.000,1.000,"
+
+
+def test_markers_are_called_as_drawings_call_them_and_by_node_between_crossings():
+    made = Markers(np.array([7, 4]), np.array([3, -1]), ("V5", "U1"))
+    assert made.called([0, 1]) == "crossing 3 (rod V5), node 4 of rod U1"
 
 
 class Model:
