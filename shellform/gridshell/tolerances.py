@@ -4,7 +4,8 @@ Every entry is the standard deviation of a normal variable of mean 0 (stiffnesse
 standard states a permissible deviation that is meant to hold for nearly all pieces, half of it is taken, so
 that 95 % of the pieces keep it; a cable's permissible deviation is taken whole, since its ends slip too.
 `SOURCES` names where each default is from; `default_tolerances` evaluates them for the real size. A model
-below 2 m is built in the workshop with jigs and callipers, and has defaults of its own.
+below 2 m is built with jigs and callipers, what spans less than 4 m in a workshop, to whose general
+tolerances dimensions are kept that far; both have defaults of their own.
 """
 
 from __future__ import annotations
@@ -20,20 +21,30 @@ from shellform.gridshell.gridshell import Gridshell
 from shellform.quantities import PLACE_DEVIATION
 
 SCALE_MODEL_BELOW: Final = 2.0  # m of span
+WORKSHOP_BELOW: Final = 4.0  # m of span: the largest dimension in `_MEDIUM`
+# m: ISO 2768-1, class m (medium): up to which dimension, and what is permitted either way
+_MEDIUM: Final = (
+    (0.006, 1e-4),
+    (0.03, 2e-4),
+    (0.12, 3e-4),
+    (0.4, 5e-4),
+    (1.0, 8e-4),
+    (2.0, 1.2e-3),
+    (4.0, 2e-3),
+)
 LARGEST_SHARE: Final = 0.5  # relative deviations beyond this are no tolerances
 LENGTHS: Final = ("cable_length", "supports", "marks")  # the deviations that are lengths
 
 SOURCES: Final[Mapping[str, str]] = {
     "cable_length": "cut length and turnbuckle: EN 1090-2 annex B, length of a cut member, 2 mm + L/5000; "
-    "scale model: set "
-    "by callipers to 0.1 mm",
+    "in a workshop (spans of 2 to 4 m): ISO 2768-1, class m; scale model: set by callipers to 0.1 mm",
     "cable_stiffness": "EN 12385-10 and VDI 2358 leave the modulus of a strand to tests; 5 % about the "
     "maker's mean",
     "supports": "DIN 18202 table 1 permits 10 mm in plan up to 1 m between points that are set out, two "
-    "deviations; scale "
+    "deviations; in a workshop (spans of 2 to 4 m): ISO 2768-1, class m, 2 mm, two deviations; scale "
     "model: drilled base plate, 0.1 mm",
     "marks": "scribed to 1 mm, beside half of what a tape of class II may be off (2004/22/EC: 0.3 mm + 0.2 "
-    "mm/m); scale "
+    "mm/m); in a workshop (spans of 2 to 4 m): ISO 2768-1, class m, of the longest rod, two deviations; scale "
     "model: 0.2 mm",
     "rod_stiffness": "JCSS Probabilistic Model Code part 3.2, modulus of elasticity: coefficient of "
     "variation 0.03",
@@ -129,11 +140,19 @@ def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float)
     for name, value in (("span", span), ("longest_rod", longest_rod)):
         require_number(value, above=0.0, where=name, give="metres, such as 0.9")
     model = span < SCALE_MODEL_BELOW
+    if model:
+        cable_length, supports, marks = 1e-4, 1e-4, 2e-4
+    elif span < WORKSHOP_BELOW:
+        cable_length, supports = _medium(longest_cable), 0.5 * _medium(span)
+        marks = 0.5 * _medium(longest_rod)
+    else:
+        cable_length, supports = 2e-3 + longest_cable / 5000.0, 5e-3
+        marks = 1e-3 + 0.5 * (0.3e-3 + 0.2e-3 * longest_rod)
     return Tolerances(
-        cable_length=1e-4 if model else 2e-3 + longest_cable / 5000.0,
+        cable_length=cable_length,
         cable_stiffness=0.05,
-        supports=1e-4 if model else 5e-3,
-        marks=2e-4 if model else 1e-3 + 0.5 * (0.3e-3 + 0.2e-3 * longest_rod),
+        supports=supports,
+        marks=marks,
         rod_stiffness=0.03,
         rod_bow=0.001,
         connectors=0.1,
@@ -142,6 +161,12 @@ def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float)
         load_uneven=0.01 if model else 0.05,
         shape=1e-4 if model else 5e-4,
     )
+
+
+def _medium(dimension: float) -> float:
+    """What ISO 2768-1 permits a `dimension`, m, to be off either way in class m, m; beyond the table what its
+    largest may be."""
+    return next((off for most, off in _MEDIUM if dimension <= most), _MEDIUM[-1][1])
 
 
 def enlarged(tolerances: Tolerances, factor: float) -> Tolerances:
