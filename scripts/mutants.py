@@ -9,7 +9,7 @@ The likeliest test files of a fault are those of the same room that name the mod
 all of the room. They are run once without any fault, in one process, which tells what fails anyhow and is
 left out, and which of the package's functions each test calls. Then the process is forked for each fault: the
 child puts the faulty function in the sound one's place and runs the tests that call it, those that do so
-themselves before those whose fixtures do, and the quickest first. Tests that start processes of their own
+themselves before those whose fixtures do, and the quickest first. Tests that have processes of their own
 can't be run so and are left out, by their names. A fault that no test notices is listed with
 its line; what nobody could notice stands with its reason in scripts/mutants.toml. Status 1 where fewer than
 90 % of the others are caught.
@@ -31,6 +31,7 @@ import ast
 import functools
 import gc
 import json
+import multiprocessing
 import os
 import random
 import resource
@@ -353,6 +354,7 @@ class Planter:
         items = [*session.items]
         for k, item in enumerate(items):
             began, since, self.failed = time.process_time(), time.monotonic(), ""
+            waited_for = bool(multiprocessing.active_children())  # a fixture's workers
             with _telling_starts() as starts:
                 sys.settrace(self._trace)
                 self._run(item, items[(k + 1) % len(items)])
@@ -361,9 +363,9 @@ class Planter:
             self._waited[item.nodeid] = time.monotonic() - since
             if self.failed:
                 print(f"left out: {self.failed} fails without any fault", file=self.told, flush=True)
-            if starts:
-                print(f"left out: {item.nodeid} starts processes", file=self.told, flush=True)
-            if self.failed or starts:
+            if starts or waited_for:
+                print(f"left out: {item.nodeid} has processes of its own", file=self.told, flush=True)
+            if self.failed or starts or waited_for:
                 self._itself.pop(item.nodeid, None)
         spent = sum(self._seconds.values())
         print(f"{len(items)} tests, {spent:.0f} s of processor time", file=self.told, flush=True)
