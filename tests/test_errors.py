@@ -8,6 +8,7 @@ from shellform.errors import (
     InputError,
     NotConverged,
     how_many,
+    if_per_cents,
     not_installed,
     printable,
     require_count,
@@ -132,3 +133,9 @@ def test_a_refusal_is_its_cause_and_then_its_remedy():
         assert (error.cause, error.remedy, str(error)) == (cause, "Give 2.", f"{cause}. Give 2.")
     for bare in (InputError("is odd", **given), NotConverged("It stalls")):
         assert (str(bare), bare.remedy) == (bare.cause, "")
+
+
+def test_per_cents_are_suspected_between_the_whole_and_a_hundred_times_what_may_be():
+    assert if_per_cents(97.0, 1.0) == " For 97 % write 0.97."
+    assert if_per_cents(199.0, 2.0) == " For 199 % write 1.99."
+    assert [if_per_cents(value, 1.0) for value in (1.0, 100.0, 150.0)] == [""] * 3

@@ -355,6 +355,7 @@ def test_bad_options_are_refused(folder, tmp_path):
     refused(shellform("erect", folder, "--by", "supports", "--tighten-first"), "goes with a scaffold")
     refused(shellform("erect", folder, "--step", "1e-300"), "erect.step: must be between 0.0001 and 1")
     refused(shellform("calibrate", folder), "Missing argument")
+    refused(shellform("calibrate", folder, f"{good}=none", "--free", "gap"), "isn't a connector's stiffness")
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["designs"].keys() == {
         "unbraced",
         "initial",
