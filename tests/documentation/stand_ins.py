@@ -103,6 +103,7 @@ def measured_run(here):
         _table(here / f"{name}.csv", "crossing,x,y,z", [(k, *place) for k, place in enumerate(seen)])
     cables = range(int(run.designs["optimised"].present.sum()))
     _table(here / "groups.csv", "cable,group", [(k, 1 + k % 2) for k in cables])
+    _table(here / "props.csv", "crossing", [(k,) for k in range(0, len(nodes), 2)])
 
 
 def _table(path, head, rows):
