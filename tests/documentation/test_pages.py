@@ -7,6 +7,8 @@ with which its last command ends; `with the names of start.md`; `with your files
 instead of minutes, `design` gets small settings, and a study of 200 designs is cut to four.
 """
 
+import ast
+import importlib
 import json
 import re
 import shlex
@@ -16,6 +18,7 @@ import sys
 import tomllib
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -98,6 +101,47 @@ def test_every_command_that_is_shown_is_one_of_the_program_s(name):
                 continue
             command = group.commands[words[1]]
             command.make_context(words[1], words[2:])  # raises for what it doesn't take
+
+
+def named_there(page):
+    """What a page's Python takes from the package, by how it is written: "retensioning.learn"."""
+    found, taken = {}, {"sf": sf}
+    for block in blocks(page):
+        if block.language != "python":
+            continue
+        tree = ast.parse(block.text)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("shellform"):
+                home = importlib.import_module(node.module)
+                for each in node.names:
+                    found[f"{node.module}.{each.name}"] = home, each.name
+                    taken[each.asname or each.name] = getattr(home, each.name, None)
+        for node in ast.walk(tree):
+            if (
+                isinstance(node, ast.Attribute)
+                and isinstance(node.value, ast.Name)
+                and node.value.id in taken
+            ):
+                home = taken[node.value.id]
+                if isinstance(home, ModuleType):
+                    found[f"{node.value.id}.{node.attr}"] = home, node.attr
+    return found
+
+
+@pytest.mark.parametrize("name", pages("python"))
+def test_every_name_that_python_on_a_page_takes_from_the_package_is_there(name):
+    """Without running it, which takes minutes."""
+    assert [text for text, (home, own) in named_there(PAGES / name).items() if not hasattr(home, own)] == []
+
+
+def test_a_name_that_went_is_found_on_a_page(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "```python\nfrom shellform import retensioning\nretensioning.drawn(1)\nsf.optimise(2)\nsf.gone\n```\n",
+        encoding="utf-8",
+    )
+    gone = [text for text, (home, own) in named_there(page).items() if not hasattr(home, own)]
+    assert sorted(gone) == ["retensioning.drawn", "sf.gone"]
 
 
 def unknown(entries, part, kinds, place=""):
