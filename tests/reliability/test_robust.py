@@ -66,10 +66,12 @@ def test_each_cause_has_its_own_share_and_all_together_what_moves_the_nodes(dome
 
 
 def test_causes_are_told_in_words_from_a_hundredth_of_the_scatter_on(told):
-    few = replace(told, causes={"marks": (0.2, 0.5), "supports": (0.795, 0.5), "rod_bow": (0.005, 0.0)})
+    causes = {"marks": (0.2, 0.5), "supports": (0.795, 0.5), "rod_bow": (0.005, 0.0)}
+    nodes = len(told.node_deviation)
+    few = replace(told, mean=4e-6 * nodes, deviation=4.2e-6, causes=causes)
     first, *causes = few.sentences()
-    assert f"{told.mean:.3g} ± {told.deviation:.2g} m²" in first
-    assert f"{1e3 * np.sqrt(told.mean / len(told.node_deviation)):.3g} mm a node" in first
+    assert "± 4.2 × 10⁻⁶ m²" in first
+    assert " 2 mm a node" in first
     assert causes == [
         "79.5 % of the scatter of the shape comes from supports.",
         "20.0 % of the scatter of the shape comes from marks.",

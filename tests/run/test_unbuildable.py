@@ -64,24 +64,24 @@ def test_shells_of_a_fifth_of_a_metre_to_150_m_in_plan_are_of_a_size_that_there_
 
 
 @pytest.mark.parametrize(
-    ("size", "unit", "metres"),
+    ("written", "size", "unit", "metres"),
     [
-        ((2000.0, 900.0, 5e5), "mm", "2"),
-        ((1999.0, 900.0, 500.0), "cm", "20"),
-        ((300.0, 75000.0, 1.0), "mm", "75"),
-        ((199.0, 1.0, 1.0), "in", "5.05"),
-        ((151.0, 1.0, 1.0), "in", "3.84"),
-        ((7500.0, 1.0, 1.0), "mm", "7.5"),
-        ((76000.0, 1.0, 1.0), None, None),
-        ((0.0019, 0.001, 9.0), None, None),
+        ("2\u202f000 × 900 × 500\u202f000 m", (2000.0, 900.0, 5e5), "mm", "2"),
+        ("1\u202f999 × 900 × 500 m", (1999.0, 900.0, 500.0), "cm", "20"),
+        ("300 × 75\u202f000 × 1 m", (300.0, 75000.0, 1.0), "mm", "75"),
+        ("199 × 1 × 1 m", (199.0, 1.0, 1.0), "in", "5.05"),
+        ("151 × 1 × 1 m", (151.0, 1.0, 1.0), "in", "3.84"),
+        ("7\u202f500 × 1 × 1 m", (7500.0, 1.0, 1.0), "mm", "7.5"),
+        ("76\u202f000 × 1 × 1 m", (76000.0, 1.0, 1.0), None, None),
+        ("0.0019 × 0.001 × 9 m", (0.0019, 0.001, 9.0), None, None),
     ],
 )
 def test_a_size_that_no_shell_has_is_refused_with_the_first_unit_that_makes_a_building_of_it(
-    size, unit, metres
+    written, size, unit, metres
 ):
     with pytest.raises(InputError, match="which no gridshell is") as told:
         refuse_size(of_size(*size))
-    assert f"{size[0]:.4g} × {size[1]:.4g} × {size[2]:.4g} m" in told.value.what
+    assert f"is {written}, which" in told.value.what
     assert f"150 m). {told.value.remedy}" in str(told.value), "one sentence ends before the next"
     if unit is None:
         assert told.value.remedy == "Scale the file to the size that is meant."
