@@ -65,8 +65,9 @@ def write_page(runs: Sequence[Run], file: Path) -> Path:
 
 
 def shown_run(run: Run, budget: int = _BUDGET, *, page: Path | None = None) -> ShownRun:
-    """A run as the `page` (in its folder) takes it, with at most `budget` bytes of pictures."""
-    pictures, left = embed(_pictures(run), budget=budget)
+    """A run as the `page` (in its folder) takes it, with at most `budget` bytes of pictures; 0: none is
+    read."""
+    pictures, left = embed(_pictures(run) if budget else [], budget=budget)
     found = run_checks(run)
     return ShownRun(
         title=run.case.title or run.folder.resolve().name,
