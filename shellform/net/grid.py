@@ -230,3 +230,8 @@ def edge_diagonals(grid: Grid) -> Indices:
             gone = here.index(None)
             found.append([here[(gone + 1) % 4], here[(gone + 3) % 4]])
     return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+
+def rod_names(grid: Grid) -> list[str]:
+    """What drawings, schedules and the page call its rods: U or V and the rod's number, as U5 or V16."""
+    return [f"{rod.direction.upper()}{k}" for k, rod in enumerate(grid.rods)]

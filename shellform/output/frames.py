@@ -11,8 +11,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.grid import rod_names
 from shellform.optimiser.optimum import Optimum
-from shellform.output.workshop.schedules import cable_crossings, rod_names
+from shellform.output.workshop.schedules import cable_crossings
 from shellform.problem.paths import deviations
 from shellform.structure.elements.state import State
 from shellform.tables import Table, Value

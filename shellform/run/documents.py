@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from shellform.case.case import Case, StockRodEntry
 from shellform.gridshell.catalogue import read_catalogue
+from shellform.net.grid import rod_names
 from shellform.output.exchange import exports
 from shellform.output.workshop import drawings, nesting, schedules
 from shellform.output.workshop.schedules import Built, TitleBlock
@@ -62,7 +63,7 @@ def write_documents(run: Run, *, report: Report = unheard) -> DocumentsRecord:
     exports.write_exports(run.folder / "models", built, run.surface, run.loads)
     if exports.no_step():
         report(Event("documents", f"no STEP file: {exports.no_step()}", Kind.NOTE))
-    bars, *spliced = cutting_notes(cutting, schedules.rod_names(run.net.grid))
+    bars, *spliced = cutting_notes(cutting, rod_names(run.net.grid))
     doubts = (*spliced, *schedules.turnbuckles_of_cables(built))
     for note in doubts:
         report(Event("documents", note, Kind.NOTE))

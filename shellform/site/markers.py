@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Indices, Record
-from shellform.net.grid import Grid
+from shellform.net.grid import Grid, rod_names
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,5 +46,5 @@ def markers_of(grid: Grid, nodes: Indices) -> Markers:
     rod = np.zeros(len(grid.flat), dtype=np.int64)
     for k, each in enumerate(grid.rods):
         rod[each.nodes] = k
-    names = tuple(f"{grid.rods[k].direction.upper()}{k}" for k in rod[nodes].tolist())
-    return Markers(nodes, crossing[nodes], names)
+    names = rod_names(grid)
+    return Markers(nodes, crossing[nodes], tuple(names[k] for k in rod[nodes].tolist()))

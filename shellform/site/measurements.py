@@ -16,6 +16,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many, require_file, unreadable
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.grid import rod_names
 from shellform.quantities import PLACE_DEVIATION
 
 
@@ -274,12 +275,13 @@ def read_way(
 
 def _refuse_far_ends(stop: float, places: dict[int, list[float]], path: str | Path, shell: Gridshell) -> None:
     """Raises InputError where a stop puts a rod's supports farther apart than the rod is long."""
-    for number, rod in enumerate(shell.net.grid.rods):
+    grid = shell.net.grid
+    for name, rod in zip(rod_names(grid), grid.rods, strict=True):
         ends = [places[int(node)] for node in rod.nodes[[0, -1]] if int(node) in places]
         apart = math.dist(*ends) if len(ends) == 2 else 0.0
         if apart > rod.length * _STRETCH:
             raise InputError(
-                f"stop {stop:g} puts the ends of {rod.direction.upper()}{number} {apart:.4g} m apart, farther than it is long",
+                f"stop {stop:g} puts the ends of {name} {apart:.4g} m apart, farther than it is long",
                 where=str(path),
                 value=round(rod.length, 6),
                 remedy="Give metres, each support at its own node.",

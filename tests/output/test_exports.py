@@ -14,8 +14,9 @@ import trimesh
 
 import shellform.surface
 from shellform.errors import InputError
+from shellform.net.grid import rod_names
 from shellform.output.exchange import exports
-from shellform.output.workshop.schedules import cable_crossings, rod_names, rounds
+from shellform.output.workshop.schedules import cable_crossings, rounds
 from shellform.structure.network import assemble
 from shellform.surface.occ import session
 

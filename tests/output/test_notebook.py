@@ -14,9 +14,9 @@ from PIL import Image
 
 import shellform as sf
 from shellform.errors import InputError
+from shellform.net.grid import rod_names
 from shellform.optimiser.optimum import Optimum, Step
 from shellform.output import frames, notebook
-from shellform.output.workshop.schedules import rod_names
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
+from shellform.net.grid import rod_names
 from shellform.output.exchange import vtp
 from shellform.output.exchange.run_readers import PROGRAMS, reader, write_readers
-from shellform.output.workshop.schedules import rod_names
 from shellform.problem.paths import deviations
 from shellform.run.folder import read_run
 from tests.run.small_run import begin

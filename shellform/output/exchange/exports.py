@@ -18,13 +18,13 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.layers import TwoLayers
-from shellform.net.grid import crossing_points
+from shellform.net.grid import crossing_points, rod_names
 from shellform.net.net import EdgeLine
 from shellform.output.exchange.opensees import opensees_script
 from shellform.output.exchange.run_readers import write_readers
 from shellform.output.workshop.edge_schedule import edge_names
 from shellform.output.workshop.marks import PENS
-from shellform.output.workshop.schedules import Built, cable_crossings, rod_names, rounds, support_forces
+from shellform.output.workshop.schedules import Built, cable_crossings, rounds, support_forces
 from shellform.problem.paths import deviations
 from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State

@@ -17,6 +17,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals, Record
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.grid import rod_names
 from shellform.net.net import Net
 from shellform.output.pictures.panel import marked_nodes, scale_end
 from shellform.problem.paths import deviations
@@ -197,12 +198,12 @@ def _geometry(net: Net, middle: Reals, place: Reals) -> dict[str, Any]:
         "edges": net.edge_lines.tolist(),
         "rods": [
             {
-                "name": f"{rod.direction.upper()}{number}",
+                "name": name,
                 "nodes": rod.nodes.tolist(),
                 "length": round(1e3 * rod.length, 3),
                 "crossings": len(rod.crossings),
             }
-            for number, rod in enumerate(grid.rods)
+            for name, rod in zip(rod_names(grid), grid.rods, strict=True)
         ],
     }
 

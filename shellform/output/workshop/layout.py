@@ -18,7 +18,7 @@ from shellform.arrays import Reals
 from shellform.errors import how_many
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.layers import layers_of
-from shellform.net.grid import GridRod
+from shellform.net.grid import GridRod, rod_names
 from shellform.net.notes import NoteKind
 from shellform.output.workshop.block_schedule import block_marks
 from shellform.output.workshop.marks import (
@@ -36,7 +36,7 @@ from shellform.output.workshop.marks import (
     square,
 )
 from shellform.output.workshop.nesting import Cutting
-from shellform.output.workshop.schedules import Built, cable_crossings, rod_names, rounds
+from shellform.output.workshop.schedules import Built, cable_crossings, rounds
 
 
 def flat_grid(built: Built) -> Sheet:

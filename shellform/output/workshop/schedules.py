@@ -39,7 +39,7 @@ from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import cut_lengths
 from shellform.gridshell.layers import layers_of
-from shellform.net.grid import Grid
+from shellform.net.grid import Grid, rod_names
 from shellform.output.workshop.block_schedule import block_table
 from shellform.output.workshop.cable_forces import force_notes
 from shellform.output.workshop.edge_schedule import edge_names, edge_table
@@ -108,11 +108,6 @@ class Built(Record):
             return ()
         x, y, z = self.origin
         return (f"Coordinates count from ({x:.9g}, {y:.9g}, {z:.9g}) m: add it for those of the survey.",)
-
-
-def rod_names(grid: Grid) -> list[str]:
-    """U or V and the rod's number."""
-    return [f"{rod.direction.upper()}{k}" for k, rod in enumerate(grid.rods)]
 
 
 def rods(built: Built, cutting: Cutting) -> Table:

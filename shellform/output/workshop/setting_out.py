@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shellform.arrays import Reals
+from shellform.net.grid import rod_names
 from shellform.output.workshop.edge_schedule import edge_names
 from shellform.output.workshop.marks import (
     MM,
@@ -27,7 +28,7 @@ from shellform.output.workshop.marks import (
     point_of,
     square,
 )
-from shellform.output.workshop.schedules import Built, clashing_supports, rod_names, shoe_width
+from shellform.output.workshop.schedules import Built, clashing_supports, shoe_width
 
 
 def support_plan(built: Built) -> Sheet:
