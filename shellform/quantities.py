@@ -13,7 +13,7 @@ only where there would be more noughts than can be read at a glance.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -99,6 +99,11 @@ def number(value: float, digits: int = 3) -> str:
     mantissa, _, power = told.partition("e")
     short = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
     return f"{short} × 10{str(int(power)).translate(_RAISED)}"
+
+
+def coordinates(point: Iterable[float], digits: int = 3) -> str:
+    """A point, m, for people: "(1.2, -3, 0.45)"."""
+    return "(" + ", ".join(f"{each:.{digits}g}" for each in point) + ")"
 
 
 def newtons(force: float, digits: int = 3) -> str:

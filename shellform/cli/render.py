@@ -65,8 +65,6 @@ def render(
     quiet: Quiet = False,
 ) -> None:
     """Draw maps of a run, or a film; with --output beside those that its page shows, not in their place."""
-    from dataclasses import replace
-
     from shellform.run.figures import draw_designs, wish
     from shellform.run.folder import read_run
 
@@ -76,9 +74,8 @@ def render(
         load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods,
         transparent=transparent,
         kind=kind, film=film, by=by, tighten_first=tighten_first,
-        force_limit=force_limit, width_mm=width_mm, dpi=dpi, font_size=font_size,
+        force_limit=force_limit, width_mm=width_mm, dpi=dpi, font_size=font_size, folder=output,
     )  # fmt: skip
-    asked = replace(asked, folder=output)
     if film is None:
         files = draw_designs(found, asked)
     else:

@@ -28,6 +28,7 @@ from shellform.quantities import (
     JOINT_MASS,
     LENGTHS,
     THICKNESS,
+    coordinates,
     if_other_unit,
     number,
 )
@@ -102,8 +103,8 @@ def lying(surface: Surface, region: Region) -> Reals:
         raise InputError(
             "no part of the surface is loaded",
             where="load",
-            remedy=f"The surface reaches from {_coordinates(surface.vertices.min(axis=0))} to "
-            f"{_coordinates(surface.vertices.max(axis=0))} m.",
+            remedy=f"The surface reaches from {coordinates(surface.vertices.min(axis=0))} to "
+            f"{coordinates(surface.vertices.max(axis=0))} m.",
         )
     return triangles
 
@@ -117,10 +118,6 @@ def _parted(triangles: Reals, polygon: ArrayLike, where: str) -> tuple[Reals, Re
         return within(triangles, reals(where, polygon, (None, 2)))
     except InputError as error:
         raise InputError(error.what, where=where, value=error.value, remedy=error.remedy) from error
-
-
-def _coordinates(point: Reals) -> str:
-    return "(" + ", ".join(f"{x:.3g}" for x in point) + ")"
 
 
 def pressure(thickness: float, density: float) -> float:

@@ -31,6 +31,7 @@ from shellform.errors import InputError, require_known
 from shellform.net.net import EdgeLine, Net, Stretch
 from shellform.net.polylines import nearest
 from shellform.net.rims import End, Rim, ends_of, rim_of
+from shellform.quantities import coordinates
 from shellform.structure.elements.rotation import from_matrices
 from shellform.structure.elements.state import State
 from shellform.surface.shape.locate import Locator
@@ -162,9 +163,9 @@ def _refuse_missed(edges: Edges, rims: Sequence[Rim]) -> None:
         anywhere = place.height is None and place.box is None and place.curve is None
         if anywhere or any(place.holds(rim.points, opening=rim.opening).any() for rim in rims):
             continue
-        low, high = (", ".join(f"{each:.4g}" for each in end(points, axis=0)) for end in (np.min, np.max))
+        low, high = (coordinates(end(points, axis=0), 4) for end in (np.min, np.max))
         raise InputError(
-            f"holds no point of the surface's edges, which reach from ({low}) to ({high}) m",
+            f"holds no point of the surface's edges, which reach from {low} to {high} m",
             where=f"edges.stretch[{number}]",
             value=place.name or place.kind,
             remedy="Give a place on these, in metres, wide enough to hold vertices of the mesh; or leave the stretch out.",

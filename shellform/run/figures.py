@@ -19,7 +19,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import rod_forces
 from shellform.records import history
 from shellform.records.progress import Event, Kind, Report, unheard
-from shellform.run.folder import Run, read_run
+from shellform.run.folder import Run, figures_folder, read_run
 from shellform.run.scales import colour_limit, force_limit
 from shellform.structure.elements.state import State
 from shellform.written import make_folder
@@ -93,6 +93,7 @@ def wish(
     font_size: float | None = None,
     by: str | None = None,
     tighten_first: bool = False,
+    folder: Path | None = None,
 ) -> Wish:
     """A wish as the command line says it: `size` as WIDTHxHEIGHT, the file's `kind` without a dot. Raises
     InputError for bad options.
@@ -134,6 +135,7 @@ def wish(
         paper=paper,
         by=by,
         tighten_first=tighten_first,
+        folder=folder,
     )
 
 
@@ -226,8 +228,7 @@ def draw_failure(run: Run) -> list[Path]:
 
 def draw_histories(run: Run, *, ending: str = ".png", folder: Path | None = None) -> list[Path]:
     """The objective with its terms and cables, and the constraints, at each accepted design; .png, .svg or
-    .pdf.
-    """
+    .pdf."""
     from shellform.output.pictures import plots
 
     steps = [step for step in history.read_history(run.folder) if step.accepted]
@@ -240,7 +241,7 @@ def draw_histories(run: Run, *, ending: str = ".png", folder: Path | None = None
     at = [float(step.evaluation) for step in steps]
     terms = {name: [step.terms[name] for step in steps] for name in steps[0].terms}
     constraints = {name: [step.constraints[name] for step in steps] for name in steps[0].constraints}
-    figures = make_folder(folder or run.folder / "figures")
+    figures = figures_folder(run, folder)
     files = [figures / f"{name}{ending}" for name in ("objective", "constraints")]
     plots.objective_history(files[0], at, terms, cables=[float(step.cables) for step in steps])
     plots.constraint_history(files[1], at, constraints)
@@ -272,7 +273,7 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard
     from shellform.output.pictures.panel import Look
 
     asked = wish or Wish()
-    figures = make_folder(asked.folder or run.folder / "figures")
+    figures = figures_folder(run, asked.folder)
     if asked.quantity == "history":
         return draw_histories(run, ending=asked.endings[0], folder=asked.folder)
     if asked.quantity == "spring":  # what the springs still pull is the net's, whatever the design

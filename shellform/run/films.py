@@ -18,14 +18,13 @@ import numpy as np
 from shellform.errors import require_known
 from shellform.records.progress import Event, Report, unheard
 from shellform.run.figures import Wish, look_of, titled
-from shellform.run.folder import Run
+from shellform.run.folder import Run, figures_folder
 from shellform.site.erection import erect
 from shellform.site.erection_steps import ErectionStep
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import Equilibrium
 from shellform.structure.solve.loading import apply_load
-from shellform.written import make_folder
 
 _FRAMES = 24  # of a stage
 _BRIEF = 6  # steps to a frame where little moves
@@ -54,9 +53,8 @@ def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = unheard) -> l
         panels = _erection(run, name, wish, report)
         stem = f"erection-{name}"
     look = look_of(run, replace(wish, size=wish.size or _SIZE), panels)
-    files = [
-        make_folder(wish.folder or run.folder / "figures") / f"{stem}{ending}" for ending in wish.endings
-    ]
+    folder = figures_folder(run, wish.folder)
+    files = [folder / f"{stem}{ending}" for ending in wish.endings]
     report(Event("film", f"drawing {len(panels)} frames"))
     render.film(files, [titled(run, panel) for panel in panels], look)
     return files

@@ -100,6 +100,11 @@ class Run(Record):
         return replace(self.shell, rod=Rod(named(catalogue, section)))
 
 
+def figures_folder(run: Run, folder: Path | None = None) -> Path:
+    """Where a run's pictures go: another `folder`, or figures/ of the run; made where it isn't there."""
+    return make_folder(folder or run.folder / "figures")
+
+
 def read_run(folder: str | Path) -> Run:
     """A run with at least one design, finished or not: what the summary tells of is there.
 

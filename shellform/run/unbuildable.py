@@ -22,7 +22,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import CONCRETE, pressure
 from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
-from shellform.quantities import number
+from shellform.quantities import coordinates, number
 from shellform.run.first_trial import NEEDED, STRESSED
 from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_usual, least_spacing, radius_for
 from shellform.run.way_out import COVERED
@@ -383,4 +383,4 @@ def sharpest(net: Net) -> Reals:
 
 
 def _at(point: Reals) -> str:
-    return "(" + ", ".join(f"{x:.3g}" for x in point) + ") m"
+    return f"{coordinates(point)} m"

@@ -16,7 +16,7 @@ import numpy as np
 
 from shellform.errors import InputError, NotConverged
 from shellform.net.refusal import NoNet, Stalled
-from shellform.quantities import number
+from shellform.quantities import coordinates, number
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.fairing import Faired, faired
 from shellform.surface.shape.target import Surface
@@ -101,7 +101,7 @@ def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:
     cad = _step(folder / "surface.step", found.surface)
     write_values(folder / "change.vtu", found.surface, {"change [m]": found.change})
     most = int(np.argmax(found.change))
-    place = "(" + ", ".join(f"{x:.3g}" for x in found.before.vertices[most]) + ") m"
+    place = f"{coordinates(found.before.vertices[most])} m"
     off = f"{number(float(found.change[most]))} m off at most, at {place}, {number(float(found.change.mean()), 2)} m in the mean"
     plan_map(
         folder / "change.png",
