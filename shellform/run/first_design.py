@@ -293,14 +293,17 @@ class _Search:
             self.surface, spacing, gap, angles, self.say, self.allowance, shifted=angles is ANGLES, tell=self._say
         )  # fmt: skip
         self.angles, self.allowance.angle = found.angles or self.angles, found.best.angle
-        nets: list[Placed] = []
-        for each in (found.best, found.across):
-            if each is None or (nets and nets[0].net.edges):
-                break
-            nets.insert(0, replace(each, net=stand(each.net, self.surface, self.edges)))
-            self.say(net_told(nets[0], spacing))
-            refuse_tipping(nets[0].net)
-        return nets
+        best = self._stood(found.best, spacing)
+        if found.across is None or best.net.edges:
+            return [best]
+        return [self._stood(found.across, spacing), best]
+
+    def _stood(self, placed: Placed, spacing: float) -> Placed:
+        """The net with its edges standing on what they are, told."""
+        stood = replace(placed, net=stand(placed.net, self.surface, self.edges))
+        self.say(net_told(stood, spacing))
+        refuse_tipping(stood.net)
+        return stood
 
     def _stands(
         self, placed: Placed, choice: RodChoice, spacing: float, thickness: float

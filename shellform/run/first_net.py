@@ -30,9 +30,8 @@ from shellform.surface.shape.target import Surface
 ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
 _ALIKE = 0.05  # of curvature: nets that bend rods alike are told apart by their cost
 _ACROSS = 45.0  # degrees: from the straight lines of a saddle to its arches
-_ARCHED = (
-    2.0  # times the curvature of rods along these; across a barrel's diagonals 1.4, on saddles 2.6 to 5.4
-)
+# Times the curvature of rods along these; across a barrel's diagonals 1.4, on saddles 2.6 to 5.4.
+_ARCHED = 2.0
 _PULL, _BRIEF = 110, 70  # factorisations of one pull
 _PULLS, _USUAL_CROSSINGS = 450, 300  # factorisations of failed pulls, for so many crossings
 _LARGEST = 20.0  # times the usual crossings: hours of a processor before a design must have been found

@@ -26,7 +26,7 @@ from shellform.run.first_design import finished_design, first_design
 from shellform.run.first_edges import TUBES
 from shellform.run.first_finish import far_told
 from shellform.run.first_look import surface_entry
-from shellform.run.first_net import Allowance, larger
+from shellform.run.first_net import Allowance, bends_to, larger
 from shellform.run.first_refusal import WayOut, steadier_on_walls, with_ways_out
 from shellform.run.first_steadier import strays, strays_told
 from shellform.run.first_trial import (
@@ -210,7 +210,7 @@ def _text(
     told = "\n".join(f"#   {printable(each)}" for each in design.told)
     offset = "" if placed.offset == (0.0, 0.0) else f"\noffset = {list(placed.offset)!r}"
     angle = "as asked" if wish.angle is not None else "of those tried its rods bend least"
-    bent = 1.0 / max(placed.net.quality.curvature_max, 1e-12)
+    bent = bends_to(placed.net)
     return f"""\
 # Proposed by `shellform new` for {json.dumps(file.name, ensure_ascii=False)}: {size_text(surface.size)}, {number(surface.area, 4)} m².
 # If that size is wrong, the unit is: run `shellform new` again with --unit. What was tried:

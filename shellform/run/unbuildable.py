@@ -23,6 +23,7 @@ from shellform.gridshell.loads import CONCRETE, pressure
 from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
 from shellform.quantities import coordinates, number
+from shellform.run.first_net import bends_to
 from shellform.run.first_trial import NEEDED, STRESSED
 from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_usual, least_spacing, radius_for
 from shellform.run.way_out import COVERED
@@ -263,7 +264,7 @@ def _uncovered(surface: Surface, failure: Obstacle | None, wish: DesignWish) -> 
 def _broken(surface: Surface, failure: Obstacle, choice: RodChoice, wish: DesignWish) -> Unbuildable:
     """The refusal of a surface into which rods can't be bent, or in which the load breaks them."""
     placed, stress = failure.placed, failure.stress
-    bends = 0.0 if placed is None else 1.0 / max(placed.net.quality.curvature_max, 1e-12)
+    bends = 0.0 if placed is None else bends_to(placed.net)
     loaded = failure.why is Why.STRENGTH and failure.factor > 0.0
     done = "bent" if failure.why is Why.CURVATURE else "stressed"
     allowed = (
@@ -332,7 +333,7 @@ def _crease(surface: Surface, failure: Obstacle, wish: DesignWish, bears: float 
     if placed is None or choice is None or failure.why not in (Why.STABILITY, Why.STRENGTH):
         return None
     net = placed.net
-    radius = 1.0 / max(net.quality.curvature_max, 1e-12)
+    radius = bends_to(net)
     wanted = _rounding(surface, failure, wish)
     if wanted < _WORTH * radius:
         return None

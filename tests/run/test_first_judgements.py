@@ -490,6 +490,7 @@ def nets_of(monkeypatch, found, stood):
         surface=None, wish=SimpleNamespace(angle=30.0), allowance=SimpleNamespace(), edges=None,
         angles=(), say=said.append, _say=said.append,
     )  # fmt: skip
+    search._stood = lambda *given: _Search._stood(search, *given)
     return _Search._nets(search, 0.5, 0.02), said
 
 

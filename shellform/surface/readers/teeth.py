@@ -44,9 +44,8 @@ _TIGHTENINGS = 40  # of the weights, at the most
 _AROUND = 24  # vertices to which the surface is fitted
 _THIN = 0.1  # of the edge's median side: the least height of a triangle
 _ROUNDS = 12  # of dropping triangles
-_BROKEN_OFF = (
-    0.02  # of the triangles: a larger piece that would hang together with the others no more is meant
-)
+# Of the triangles: a larger piece that would hang together with the others no more is meant.
+_BROKEN_OFF = 0.02
 _PEELED = 3  # times that spikes are taken off an edge too ragged to be smoothed
 
 
