@@ -7,6 +7,7 @@ system's; scripts/test installs one.
 
 import base64
 import io
+import json
 import re
 import shutil
 from pathlib import Path
@@ -345,6 +346,54 @@ def test_tables_are_sorted_and_searched(visit, file):
         "[id$=-designs] tbody tr td:nth-child(2)", "cells => cells.map(cell => Number(cell.textContent))"
     )
     assert column == sorted(column)
+
+
+def test_numbers_are_sorted_by_what_they_are_worth_in_whatever_unit_they_are_told(visit, file):
+    page = visit(file)
+    worth = [
+        "−1.5 mm",
+        "3 × 10⁻¹⁰",
+        "2 × 10⁻⁴",
+        "950 N",
+        "40.9 kN",
+        "12\u202f300\u202f000",
+        "1.2 × 10¹²",
+        "–",
+    ]
+    page.evaluate(
+        """texts => {
+            const body = document.querySelector("[id$=-designs] tbody"), [own] = body.rows;
+            const rows = texts.map(() => own.cloneNode(true));
+            rows.forEach((row, k) => { row.cells[1].textContent = texts[k]; });
+            body.replaceChildren(...rows);
+        }""",
+        [worth[k] for k in (4, 0, 7, 6, 2, 3, 1, 5)],
+    )
+    for expected in (worth, worth[::-1]):
+        page.get_by_role("button", name="Sort by Cables").click()
+        column = page.locator("[id$=-designs] tbody tr td:nth-child(2)")
+        assert column.all_text_contents() == expected
+
+
+def test_forces_of_kilonewtons_are_read_in_these_in_legend_and_table(visit, file, tmp_path):
+    larger = 1e3
+    page = visit(file)
+    small = [page.locator(".cables-legend .ticks span").last.text_content(), *cells(page, "cables", 6)]
+    head, data, rest = re.split(r'(?<=id="data">)(.*?)(?=</script>)', file.read_text(encoding="utf-8"))
+    content = json.loads(data)
+    for each in content["runs"]:
+        each["force"] *= larger
+        for state in [state for design in each["designs"] for state in design["states"].values()]:
+            state["force"] = [larger * value for value in state["force"]]
+    heavy = tmp_path / "heavy.html"
+    heavy.write_text(head + json.dumps(content) + rest, encoding="utf-8")
+    page = visit(heavy)
+    caption = page.locator(".cables-legend figcaption").text_content()
+    assert caption == "Cables: force, kilonewtons; slack ones faint"
+    large = [page.locator(".cables-legend .ticks span").last.text_content(), *cells(page, "cables", 6)]
+    for before, now in zip(small, large, strict=True):
+        assert now == before or float(now) == pytest.approx(float(before), abs=6e-3)
+    assert page.get_by_role("button", name="Sort by Largest of all loads [kN]").is_visible()
 
 
 def test_everything_is_reached_by_keys(visit, file):

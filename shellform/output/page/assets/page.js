@@ -6,15 +6,15 @@ class Panel { // a run: its view, and its tables that follow
   constructor(article) {
     this.article = article;
     this.viewer = new Viewer(article, data.runs, Number(article.dataset.run), data.viridis);
-    const find = this.viewer.find, { run, mm } = this.viewer;
+    const find = this.viewer.find, { run, mm, unit } = this.viewer;
     this.cables = new LiveTable(find("[data-table=cables]"), find("[data-search=cables]"), find("[id$=-cables] .count"), [
       { title: "Cable", value: (row) => row.order, text: (row) => `C${row.order}` },
       { title: "From crossing", number: true, value: (row) => row.from, text: (row) => String(row.from) },
       { title: "To crossing", number: true, value: (row) => row.to, text: (row) => String(row.to) },
       { title: "Rest length [mm]", number: true, value: (row) => row.rest, text: (row) => mm(row.rest) },
       { title: "Length [mm]", number: true, value: (row) => row.length, text: (row) => mm(row.length) },
-      { title: "Force [N]", number: true, value: (row) => row.force, text: (row) => (row.force > 0 ? newtons(row.force) : "slack") },
-      { title: "Largest of all loads [N]", number: true, value: (row) => row.most, text: (row) => newtons(row.most) },
+      { title: `Force [${unit.name}]`, number: true, value: (row) => row.force / unit.size, text: (row) => unit.cable(row.force) },
+      { title: `Largest of all loads [${unit.name}]`, number: true, value: (row) => row.most / unit.size, text: (row) => unit.of(row.most) },
     ], (key) => this.viewer.pick({ kind: "cable", index: key }));
     this.rods = new LiveTable(find("[data-table=rods]"), find("[data-search=rods]"), find("[id$=-rods] .count"), [
       { title: "Rod", value: (row) => row.key, text: (row) => row.name },

@@ -20,12 +20,20 @@ function sortHead(head, act) { // lays a button over a head cell, whose words st
   });
 }
 
+const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+
+// A number as the page writes it: 12 300, 3 × 10⁻⁵, 40.9 kN beside 950 N; NaN where the text begins with none.
+function written(text) {
+  const [, digits, power = "0", prefix = ""] = text.replaceAll("\u202f", "").replaceAll("−", "-").match(/^(-?[\d.]+)(?: × 10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?(?: ([kM])?N)?/) ?? [, ""];
+  return parseFloat(digits) * 10 ** Number(power.replace("⁻", "-").replace(/[¹²³⁰-⁹]/g, (raised) => RAISED.indexOf(raised))) * ({ k: 1e3, M: 1e6 }[prefix] ?? 1);
+}
+
 function sortStatic(table) { // one that the page came with
   const body = table.tBodies[0];
   [...table.tHead.rows[0].cells].forEach((head, column) => sortHead(head, (sign) => {
     const value = (row) => {
-      const text = row.cells[column].textContent.trim(), number = parseFloat(text.replace(/\u202f/g, ""));
-      return row.cells[column].classList.contains("num") ? number : text;
+      const text = row.cells[column].textContent.trim();
+      return row.cells[column].classList.contains("num") ? written(text) : text;
     };
     body.append(...[...body.rows].sort((a, b) => sign * compare(value(a), value(b))));
   }));

@@ -3,8 +3,9 @@
 const NEAR = 10; // pixels: how far from a cable or rod a click still picks it
 
 class View {
-  constructor(stage, run, viridis, show, camera = new Camera()) {
+  constructor(stage, run, viridis, show, unit, camera = new Camera()) {
     this.run = run;
+    this.unit = unit;
     this.viridis = viridis.map((colour) => colour.map((value) => value / 255));
     this.show = show; // { design, load, surface, cables, loads, supports, colour, scale, exaggerate, moment, cut, measured }
     this.stage = stage;
@@ -308,7 +309,7 @@ class View {
     this.canvas.classList.toggle("over", Boolean(found));
     if (!found) return;
     const away = this.show.colour === "curvature" ? `${this.values[found.node].toPrecision(3)} 1/m` : `${this.deviation[found.node].toFixed(2)} mm off`, k = this.design.cables.indexOf(found.index);
-    this.tip.textContent = found.kind === "cable" ? `Cable C${k}: ${newtons(this.force[k])} N` : `Rod ${this.run.rods[found.index].name}: ${away}`;
+    this.tip.textContent = found.kind === "cable" ? `Cable C${k}: ${this.unit.of(this.force[k])} ${this.unit.name}` : `Rod ${this.run.rods[found.index].name}: ${away}`;
     const top = this.canvas.offsetTop + y - 36, left = Math.min(x + 12, this.canvas.clientWidth - this.tip.offsetWidth - 8);
     Object.assign(this.tip.style, { left: `${left}px`, top: `${Math.max(top, 4)}px` });
   }
@@ -334,4 +335,9 @@ function rgb(text) { // of "#rrggbb" or "#rgb"
   return [0, 2, 4].map((k) => parseInt(wide.slice(k, k + 2), 16) / 255);
 }
 
-function newtons(force) { return force >= 1000 ? force.toFixed(0) : force >= 100 ? force.toFixed(1) : force.toFixed(2); }
+// The unit that forces up to the largest of all loads are read in: the pictures' own.
+class ForceUnit {
+  constructor(most) { [this.name, this.word, this.size, this.digits] = most >= 1000 ? ["kN", "kilonewtons", 1000, 3] : ["N", "newtons", 1, 2]; }
+  of(force) { const value = force / this.size; return value.toFixed(value >= 1000 ? 0 : value >= 100 ? 1 : this.digits); }
+  cable(force) { return force > 0 ? this.of(force) : "slack"; }
+}

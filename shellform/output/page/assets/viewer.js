@@ -6,6 +6,7 @@ class Viewer {
     this.runs = runs;
     this.run = runs[number];
     this.viridis = viridis;
+    this.unit = new ForceUnit(largest(runs.map((each) => each.force)));
     this.picked = null;
     this.hint = article.querySelector(".picked").textContent;
     this.onshow = () => {}; // after any change of what is shown
@@ -62,7 +63,7 @@ class Viewer {
     const canvas = pane.querySelector("canvas");
     if (pane.dataset.used) canvas.replaceWith(canvas.cloneNode());
     pane.dataset.used = "yes";
-    const view = new View(pane, run, this.viridis, show, camera);
+    const view = new View(pane, run, this.viridis, show, this.unit, camera);
     view.onmeasure = (crossing) => this.measured(this.show.measured.length === 2 ? [crossing] : [...this.show.measured, crossing]);
     return view;
   }
@@ -187,7 +188,8 @@ class Viewer {
     this.find(".rods-legend figcaption").textContent = this.show.colour === "curvature" ? "Rods: curvature, 1/metre" : stress ? "Rods: bending stress, percent of the strength" : "Rods: distance from the target, millimetres";
     ticks(".rods-legend", scale, digits(scale), this.show.colour !== "curvature" && (stress || this.show.scale !== "state"));
     this.find(".cables-legend").hidden = !this.design.cables.length || !(forceScale > 1e-9);
-    ticks(".cables-legend", forceScale, digits(forceScale), false);
+    this.find(".cables-legend figcaption").textContent = `Cables: force, ${this.unit.word}; slack ones faint`;
+    ticks(".cables-legend", forceScale / this.unit.size, digits(forceScale / this.unit.size), false);
   }
 
   measuring(on) {
@@ -250,7 +252,7 @@ class Viewer {
   cable(index) {
     const k = this.design.cables.indexOf(index), [from, to] = this.run.cables.joints[index];
     const words = element("p", `From crossing ${from} to ${to}, rest length ${this.mm(this.design.rest[k])} mm.`);
-    return [words, this.overLoads(["Length [mm]", "Force [N]"], (state) => [this.mm(state.length[k]), state.force[k] > 0 ? newtons(state.force[k]) : "slack"])];
+    return [words, this.overLoads(["Length [mm]", `Force [${this.unit.name}]`], (state) => [this.mm(state.length[k]), this.unit.cable(state.force[k])])];
   }
 
   rod(index) {
