@@ -287,22 +287,23 @@ class Evaluator:
     def _tried(
         self, design: Design, near: Mapping[str, State], stage: float, order: Sequence[str], lead: bool
     ) -> list[_Tried]:
-        """The equilibria under the loads in `order`, sought side by side; after one that has none, and unless
-        others are to `lead` to it, those that haven't begun are given up."""
+        """The equilibria under the loads in `order`, sought side by side; those after one that has none are
+        given up where they haven't begun, unless others are to `lead` to it. The first that has none is
+        always the same one, whichever is found first."""
         idle = [self.assembly(design, number) for number in range(min(cores(), len(order)))]
-        lost: list[str] = []
+        lost: list[int] = []
 
-        def settled(name: str) -> _Tried:
-            if lost and (not lead or self.base in lost):
-                return _Tried(None, 0, "another load wasn't borne")
-            own = idle.pop()
+        def settled(place: int) -> _Tried:
+            if any(each < place and (not lead or order[each] == self.base) for each in lost):
+                return _Tried(None, 0, "a load before it wasn't borne")
+            own, name = idle.pop(), order[place]
             found = self._settled(own, near[name], self.load(name, stage))
             idle.append(own)
             if found.state is None:
-                lost.append(name)
+                lost.append(place)
             return found
 
-        return side_by_side(settled, list(order))
+        return side_by_side(settled, range(len(order)))
 
     def _settled(self, assembly: Assembly, start: State, load: Reals) -> _Tried:
         """The stable equilibrium next to the state `start` under the `load`."""

@@ -133,7 +133,7 @@ def trying(evaluator, monkeypatch):
         told.seeded.append((design, states, stage))
         return "seeded"
 
-    monkeypatch.setattr(evaluation, "cores", lambda: 1)
+    monkeypatch.setattr(evaluation, "side_by_side", lambda work, items: [work(each) for each in items])
     monkeypatch.setattr(evaluator, "assembly", lambda design, number: number)
     monkeypatch.setattr(evaluator, "_settled", settled)
     monkeypatch.setattr(evaluator, "_led", led)
@@ -163,6 +163,20 @@ def test_a_trial_is_given_up_with_the_first_load_that_it_does_not_bear(evaluator
     assert trying.tried == ["wind", "wetter"], "the design load last, which it bears as a rule"
     assert (evaluator.evaluations, evaluator.rejected, evaluator.wasted) == (1, 1, 10)
     assert trying.seeded == []
+
+
+def test_the_first_load_of_the_order_that_is_not_borne_gives_a_trial_up_whichever_is_found_first(
+    evaluator, trying, monkeypatch
+):
+    """So that what a trial has spent, and why it is given up, hangs on no thread."""
+    monkeypatch.setattr(
+        evaluation, "side_by_side", lambda work, items: [work(each) for each in reversed(items)][::-1]
+    )
+    trying.borne = {"wind"}
+    with pytest.raises(OffBranch, match="wetter isn't borne"):
+        trying.evaluate(False)
+    assert trying.tried == ["wet", "wetter", "wind"]
+    assert evaluator.factorisations == 10
 
 
 def test_a_load_that_is_too_far_off_is_led_to_from_the_design_load_where_that_is_asked_for(evaluator, trying):

@@ -401,9 +401,9 @@ def test_drawn_structures_are_loaded_number_by_number_and_counted(monkeypatch, w
     monkeypatch.setattr(standing, "variables", lambda members, seed, number: (members, seed, number))
     monkeypatch.setattr(standing, "errors_of", lambda members, tolerances, z: (tolerances, z))
     made.load_numbers("rough", seed=4, numbers=[5, 2], step=0.5, marks=(0.8,), resting=0.3)
-    assert heard == [
+    assert sorted(heard, key=lambda each: each[1]["number"]) == [
         (("rough", ("members", 4, k)), {"number": k, "step": 0.5, "marks": (0.8,), "resting": 0.3})
-        for k in (5, 2)
+        for k in (2, 5)
     ]
     monkeypatch.setattr(standing, "perfect", lambda *given: given)
     monkeypatch.setattr(standing, "Workshop", lambda nominal: made)
