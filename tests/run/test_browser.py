@@ -214,7 +214,11 @@ def test_what_is_shown_can_be_switched_turned_and_scaled(visit, file):
 def test_the_colours_fit_the_design_and_its_cables_are_saved_as_shown(visit, file, tmp_path):
     page = visit(file)
     off = float(re.search(r"([\d.]+) mm off at most", page.locator(".told").first.text_content())[1])
-    end = float(page.locator(".rods-legend .ticks span").last.text_content().removeprefix("≥ "))
+    ticks = page.locator(".rods-legend .ticks span").all_text_contents()
+    end = float(ticks[-1].removeprefix("≥ "))
+    assert [float(each.removeprefix("≥ ")) for each in ticks] == pytest.approx(
+        end * np.linspace(0.0, 1.0, 5), abs=9e-3 * end
+    ), "a number stands where it says"
     assert off <= 1.01 * end <= 2.6 * off
     with page.expect_download() as begun:
         page.locator("[data-save=cables]").click()

@@ -1,5 +1,7 @@
 // The view with its controls: what is shown, a second design beside the first, the way from the flat grid, measuring and cutting.
 
+const TRUE = 0.01; // of a scale: how far from its place a number of its legend may stand, as in the pictures
+
 class Viewer {
   constructor(article, runs, number, viridis) {
     this.article = article;
@@ -180,16 +182,18 @@ class Viewer {
   }
 
   legends() {
-    const ticks = (where, end, digits, over) => {
-      const frame = this.find(`${where} .ticks`);
-      frame.replaceChildren(...[0, 0.25, 0.5, 0.75, 1].map((share) => element("span", (share === 1 && over ? "≥ " : "") + (share * end).toFixed(digits))));
+    const ticks = (where, end, over) => { // a number has to stand where it says
+      const values = [0, 0.25, 0.5, 0.75, 1].map((share) => share * end);
+      let digits = 0;
+      while (digits < 12 && values.some((value) => Math.abs(Number(value.toFixed(digits)) - value) > TRUE * end)) digits += 1;
+      this.find(`${where} .ticks`).replaceChildren(...values.map((value, k) => element("span", (k === 4 && over ? "≥ " : "") + (value ? value.toFixed(digits) : "0"))));
     };
-    const digits = (end) => Math.max(0, 2 - Math.floor(Math.log10(end / 4 + 1e-12)) - 1), { scale, forceScale } = this.view, stress = this.show.colour === "stress";
+    const { scale, forceScale } = this.view, stress = this.show.colour === "stress";
     this.find(".rods-legend figcaption").textContent = this.show.colour === "curvature" ? "Rods: curvature, 1/metre" : stress ? "Rods: bending stress, percent of the strength" : "Rods: distance from the target, millimetres";
-    ticks(".rods-legend", scale, digits(scale), this.show.colour !== "curvature" && (stress || this.show.scale !== "state"));
+    ticks(".rods-legend", scale, this.show.colour !== "curvature" && (stress || this.show.scale !== "state"));
     this.find(".cables-legend").hidden = !this.design.cables.length || !(forceScale > 1e-9);
     this.find(".cables-legend figcaption").textContent = `Cables: force, ${this.unit.word}; slack ones faint`;
-    ticks(".cables-legend", forceScale / this.unit.size, digits(forceScale / this.unit.size), false);
+    ticks(".cables-legend", forceScale / this.unit.size, false);
   }
 
   measuring(on) {
