@@ -39,6 +39,7 @@ from shellform.tables import Table, table_text
 # linearisations of one survey; where no cable becomes slack the error is of second order after each
 _LEARNING = 8
 _SETTLED = 0.02  # of a cable's usual error: smaller changes of the estimate end the learning
+_NO_STEP = 1e-9  # of a cable's usual error: rounding says whether a smaller change is likelier
 _HALVINGS = 5  # of a change that leaves the stable branch, or leads to no likelier estimate
 _TRIAL = 25  # factorisations of an equilibrium next to a known one
 
@@ -152,6 +153,8 @@ def learn(shell: Gridshell, belief: Belief, nodes: Indices, survey: Reals, *, no
         gain = np.linalg.solve(rates @ spread + noise**2 * np.eye(len(goal)), spread.T).T
         here = now.rest_length[present]
         step = mean + gain @ (goal - state.positions[marked].ravel() - rates @ (mean - here)) - here
+        if np.abs(step).max() < _NO_STEP * usual:
+            break
         # Whole steps go to and fro where cables become slack by one and taut by the next.
         for _ in range(_HALVINGS):
             then, there, _ = _followed(shell, assembly, now, state, belief.load, step)
