@@ -54,6 +54,7 @@ from shellform.problem.constraints import Between as Between
 from shellform.problem.constraints import Constraint as Constraint
 from shellform.problem.engineering import ConnectorTurn as ConnectorTurn
 from shellform.problem.engineering import LargestCableForce as LargestCableForce
+from shellform.problem.engineering import LargestDeviation as LargestDeviation
 from shellform.problem.engineering import LeastTension as LeastTension
 from shellform.problem.engineering import ModalStiffness as ModalStiffness
 from shellform.problem.engineering import RodUtilisation as RodUtilisation

@@ -142,6 +142,7 @@ def _allowed(case: Case) -> Iterator[tuple[str, float]]:
     for where, length in (
         ("limits.deviation", case.limits.deviation),
         ("limits.built_deviation", case.limits.built_deviation),
+        ("limits.unloaded_deviation", case.limits.unloaded_deviation),
         ("optimise.deviation", case.optimise.deviation),
         ("optimise.misfit_rms_additional", case.optimise.misfit_rms_additional),
         ("robust.limit", None if case.robust is None else case.robust.limit),

@@ -1,6 +1,6 @@
 """From a case to its design problem, the engineer's limits included.
 
-Every limit but the deviation's holds under every load case, and those that matter before concrete comes also
+Every limit but the deviations' holds under every load case, and those that matter before concrete comes also
 without load. The critical load factor F is kept by a load case "critical NAME", F times the load case, that
 every accepted design bears on its stable branch, its softest mode keeping a share of the initial design's
 stiffness under the design load (engineering.py: ModalStiffness). Load steps can pass a bifurcation that is
@@ -25,6 +25,7 @@ from shellform.problem.constraints import AtLeast, AtMost, Constraint
 from shellform.problem.engineering import (
     ConnectorTurn,
     LargestCableForce,
+    LargestDeviation,
     LeastTension,
     ModalStiffness,
     RodUtilisation,
@@ -119,10 +120,12 @@ def varied(case: Case, shell: Gridshell, *, frees_radius: bool = True) -> list[V
 
 
 def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list[Constraint]:
-    """The limits on rods, connectors, supports and slack cables; those on the shape are thinning's
-    (solver.py)."""
+    """The limits on rods, connectors, supports and slack cables; those on the shape under load are
+    thinning's (solver.py)."""
     entry = case.limits
     found: list[Constraint] = []
+    if entry.unloaded_deviation is not None:
+        found.append(AtMost(entry.unloaded_deviation, LargestDeviation("none", entry.unloaded_deviation)))
     for name in loads:
         if entry.utilisation is not None:
             found.append(AtMost(entry.utilisation, RodUtilisation(name)))

@@ -10,13 +10,16 @@ from shellform.problem.engineering import BROKEN, ConnectorTurn
 
 class LimitsEntry(Entry):
     """What an engineer limits besides constraints (5) and (6), each under every load case and without load,
-    but the deviation, which counts where the concrete hardens; left out: not limited.
+    but deviations, which count where the concrete hardens and where it is poured; left out: not limited.
     """
 
     deviation: PositiveFloat | None = Field(
         None, description="largest distance of a node from its place under the design load, m"
     )
     built_deviation: PositiveFloat | None = Field(None, description="the same as built, at worst, m")
+    unloaded_deviation: PositiveFloat | None = Field(
+        None, description="the same of the braced shell before any load, m"
+    )
     utilisation: PositiveFloat | None = Field(
         None,
         le=BROKEN,

@@ -1,8 +1,8 @@
-"""What an engineer limits besides the paper's constraints: stress, the turning of connectors, cable forces,
-slack cables, uplift.
+"""What an engineer limits besides the paper's constraints: stress, distances from the target, the turning of
+connectors, cable forces, slack cables, uplift.
 
-Each is the largest of many values, v_k at rod ends, connectors, cables or supports, which has no derivative
-where two change places. The Kreisselmeier-Steinhauser function
+Each is the largest of many values, v_k at rod ends, nodes, connectors, cables or supports, which has no
+derivative where two change places. The Kreisselmeier-Steinhauser function
 
     KS(v) = max v + ln(sum exp(q (v_k - max v))) / q
 
@@ -92,6 +92,29 @@ class RodUtilisation(Term):
             own_stress = section.couple_stress(forces[locked][:, ends]) / rod.strength
             by_radius += by_moment * rates[locked][:, ends] - 3.0 / design.radius * own_stress
         return _largest(shell, 1.0, values, np.repeat(beams.dofs()[own], 2, axis=0), rows, by_radius.ravel())
+
+
+@dataclass(frozen=True)
+class LargestDeviation(Term):
+    """The largest distance, m, of a node from its place in the target; `scale`, m, is the size of distances
+    that matter, such as their limit."""
+
+    name = "deviation"
+    load: str
+    scale: float
+
+    def __post_init__(self) -> None:
+        require_number(
+            self.scale, above=0.0, where="largest_deviation.scale", give="metres, such as their limit"
+        )
+
+    def measure(self, at: LoadedDesign) -> Measurement:
+        """One value, m."""
+        away = at.state.positions - at.shell.target.positions
+        size = np.linalg.norm(away, axis=1)
+        along = away / np.maximum(size, np.finfo(float).tiny)[:, None]
+        places = 6 * np.arange(len(size))[:, None] + np.arange(3)
+        return _largest(at.shell, self.scale, size, places, along, np.zeros(len(size)))
 
 
 @dataclass(frozen=True)

@@ -33,15 +33,16 @@ _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or
 class Bounds:
     """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
     mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) the largest
-    `deviation`, m, under the design load, of the perfect structure and as `built`, `stress` over strength,
-    connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull `slack`, N, of
-    cables under the `slack_loads`, and by load the least `critical` factor; what is asked of structures as
-    built (`safety`); and how the case gives its `rods`' size."""
+    `deviation`, m, under the design load, of the perfect structure and as `built`, and `unloaded`; `stress`
+    over strength, connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull
+    `slack`, N, of cables under the `slack_loads`, and by load the least `critical` factor; what is asked of
+    structures as built (`safety`); and how the case gives its `rods`' size."""
 
     force: float
     misfit: float
     deviation: float | None = None
     built: float | None = None
+    unloaded: float | None = None
     stress: float | None = None
     turn: float | None = None
     uplift: float | None = None
@@ -171,6 +172,11 @@ def _built_deviation(row: DesignRecord) -> float | None:
     return None if shape is None else shape.deviation_max_worst
 
 
+def _unloaded_deviation(row: DesignRecord) -> float | None:
+    """The largest, m, before any load."""
+    return None if "none" not in row.loads else _deviation(row.loads["none"])
+
+
 def _edged(row: LoadRecord) -> Cell:
     """The stress of edge beams over their strength."""
     share = row.edge_utilisation_max or 0.0
@@ -223,6 +229,14 @@ def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: B
             "limits.built_deviation",
             bounds.built,
             _built_deviation,
+            "mm",
+            1e3,
+        ),
+        _Limit(
+            "Largest deviation before any load",
+            "limits.unloaded_deviation",
+            bounds.unloaded,
+            _unloaded_deviation,
             "mm",
             1e3,
         ),

@@ -22,6 +22,7 @@ TITLES = {
 _CONSTRAINTS = {
     "cable_force": "cable forces",
     "misfit": "misfit",
+    "deviation": "largest deviation",
     "built_misfit": "misfit as built",
     "softness": "stiffness of the softest mode",
     "utilisation": "rods' stress",

@@ -27,6 +27,7 @@ def run_checks(run: Run) -> list[Check]:
         misfit=run.case.optimise.misfit_rms_additional,
         deviation=limits.deviation,
         built=limits.built_deviation,
+        unloaded=limits.unloaded_deviation,
         stress=limits.utilisation,
         turn=limits.connector_turn,
         uplift=limits.uplift,

@@ -35,7 +35,8 @@ def built_deviation(surface: Surface, design: FirstDesign, stray: str) -> str:
     why = f"a {BUILT_OF_SPAN:g}th of the span" if most > design.thickness else "the concrete's thickness"
     return (
         f"built_deviation = {rounded_up(most)!r}    # m, under the design load, in the worst of twenty structures as built: {why}"
-        f"{stray and f'; {stray}'}"
+        f"{stray and f'; {stray}'}\n"
+        f"# unloaded_deviation = {rounded_up(most)!r}    # m, of the braced shell before any load: fewer cables let the load move it farther into its shape"
     )
 
 

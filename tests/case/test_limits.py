@@ -31,6 +31,7 @@ CASE = ROOT / "scripts/scale_model.toml"
 LIMITS = [
     "limits.utilisation=0.9",
     "limits.connector_turn=0.4",
+    "limits.unloaded_deviation=0.004",
     "limits.uplift=7.0",
     "limits.slack_min=0.05",
     "safety.critical_further={ additional = 1.04 }",
@@ -60,6 +61,7 @@ def test_every_limit_of_the_case_reaches_the_problem_under_every_load(shell, loa
     kinds = [(type(each.term).__name__, each.term.load) for each in problem.constraints]
     for kind in ("RodUtilisation", "ConnectorTurn", "Uplift"):
         assert [load for name, load in kinds if name == kind] == ["none", "design", "additional"]
+    assert [load for name, load in kinds if name == "LargestDeviation"] == ["none"]
     assert [load for name, load in kinds if name == "LeastTension"] == ["none", "additional"]
     assert ("LargestCableForce", "additional") in kinds
     assert ("ModalStiffness", "critical additional") in kinds
@@ -96,6 +98,7 @@ def test_every_limit_has_the_case_s_amount_in_the_term_s_own_unit(shell, loads):
         assert above("Uplift", load) == 7.0
         assert found["Uplift", load].scale == pytest.approx(14.0)
         assert above("Thrust", load) == 3.0
+    assert above("LargestDeviation", "none") == found["LargestDeviation", "none"].term.scale == 0.004
     assert above("CableForces", "design") == 18.0
     assert above("LargestCableForce", "additional") == 18.0
     assert above("RmsMisfit", "additional") == pytest.approx(0.004**2)
@@ -195,6 +198,7 @@ def test_shares_of_fixed_radii_go_to_the_others(shell, loads):
         ),
         (["optimise.neighbours=-1"], "optimise.neighbours"),
         (["limits.deviation=0"], "limits.deviation.*greater than 0"),
+        (["limits.unloaded_deviation=-1"], "limits.unloaded_deviation.*greater than 0"),
         (["limits.built_deviation=0"], "limits.built_deviation.*greater than 0"),
         (["cable.rest_ratio=1.0"], "cable.rest_ratio.*less than 1"),
         (["safety.probability_design=1.0"], "safety.probability_design.*less than 1"),

@@ -129,6 +129,7 @@ def test_unusual_materials_models_and_halls_are_read(case, settings):
     [
         ("limits.deviation", "5", 0.005),
         ("limits.built_deviation", "10", 0.01),
+        ("limits.unloaded_deviation", "10", 0.01),
         ("optimise.deviation", "5.5", 0.0055),
         ("optimise.misfit_rms_additional", "4.36", 0.00436),
         ("robust.limit", "2", 0.002),

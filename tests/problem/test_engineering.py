@@ -13,6 +13,7 @@ from shellform.problem.engineering import (
     SHARPNESS,
     ConnectorTurn,
     LargestCableForce,
+    LargestDeviation,
     LeastTension,
     ModalStiffness,
     RodUtilisation,
@@ -56,11 +57,13 @@ def limited(shell, wet, term):
 
 
 @pytest.mark.parametrize(
-    "name", ["stress", "connectors", "cables", "least tension", "uplift", "thrust", "modal stiffness"]
+    "name",
+    ["stress", "deviation", "connectors", "cables", "least tension", "uplift", "thrust", "modal stiffness"],
 )
 def test_the_gradient_of_each_limit_agrees_with_re_solved_equilibria(shell, wet, name):
     term = {
         "stress": RodUtilisation("wet"),
+        "deviation": LargestDeviation("wet", 0.005),
         "connectors": ConnectorTurn("wet"),
         "cables": LargestCableForce("wet", 5.0),
         "least tension": LeastTension("wet", 0.5),
@@ -159,6 +162,8 @@ def test_limits_that_make_no_sense_are_refused(shell, wet):
             LeastTension("wet", 0.5, let_out=far)
     with pytest.raises(InputError, match=r"largest_cable_force\.scale"):
         LargestCableForce("wet", 0.0)
+    with pytest.raises(InputError, match=r"largest_deviation\.scale"):
+        LargestDeviation("wet", 0.0)
     with pytest.raises(InputError, match=r"modal_stiffness\.scale"):
         ModalStiffness("wet", -1.0)
     with pytest.raises(InputError, match=r"uplift\.scale"):

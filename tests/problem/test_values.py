@@ -11,10 +11,18 @@ import shellform as sf
 from shellform.errors import InputError
 from shellform.gridshell.reactions import reactions
 from shellform.problem.constraints import count, residual_rows, residuals
-from shellform.problem.engineering import ConnectorTurn, LargestCableForce, ModalStiffness, Thrust, Uplift
+from shellform.problem.engineering import (
+    ConnectorTurn,
+    LargestCableForce,
+    LargestDeviation,
+    ModalStiffness,
+    Thrust,
+    Uplift,
+)
 from shellform.problem.evaluation import Evaluator
 from shellform.problem.terms import LoadedDesign, Measurement
 from shellform.problem.variables import Blocks, Rates, Variable
+from shellform.structure.elements import state as states
 
 
 @pytest.fixture
@@ -143,6 +151,20 @@ def test_connectors_turns_and_supports_forces_are_those_of_the_state(dome):
     one, other = (matrix_x(state.quaternions[nodes[:, k]]) for k in (0, 1))
     largest = np.arccos(np.clip((one * other).sum(axis=1), -1.0, 1.0)).max()
     assert 0.98 * largest <= turn <= 1.02 * largest + 0.1 * np.log(len(nodes)) / 200.0
+
+
+def test_the_largest_deviation_is_that_of_the_farthest_node_and_has_no_slope_where_nothing_is_off(dome):
+    still = LoadedDesign(dome, dome.design(), dome.target, np.zeros((dome.node_count, 6)))
+    told = LargestDeviation("wet", 0.01).measure(still)
+    assert told.value[0] == pytest.approx(0.01 * np.log(dome.node_count) / 200.0)
+    assert not told.by_dof.toarray().any()
+    step = np.zeros((dome.node_count, 6))
+    step[7, :3], step[9, :3], step[4, 3:] = (0.02, 0.0, -0.01), (0.0, 0.01, 0.0), 0.3
+    told = LargestDeviation("wet", 0.01).measure(replace(still, state=states.moved(dome.target, step)))
+    assert told.value[0] == pytest.approx(np.hypot(0.02, 0.01), rel=1e-9)
+    slope = np.zeros_like(step)
+    slope[7, :3] = step[7, :3] / np.hypot(0.02, 0.01)
+    np.testing.assert_allclose(told.by_dof.toarray().reshape(-1, 6), slope, atol=1e-9)
 
 
 def matrix_x(quaternions):

@@ -136,6 +136,7 @@ def test_a_constraint_that_is_missed_by_up_to_a_thousandth_of_its_limit_holds(
     ("bound", "load", "changes", "words"),
     [
         ({"deviation": 0.001}, "design", {"deviation_max": 0.0015}, "1.5 mm"),
+        ({"unloaded": 0.001}, "none", {"deviation_max": 0.0015}, "1.5 mm"),
         ({"stress": 0.9}, "none", {"stress_utilisation_max": 0.95}, "95 % of the strength"),
         ({"turn": 0.1}, "design", {"connector_turn_max": 0.2}, "11.5 °"),
         ({"uplift": 1.0}, "additional", {"uplift_max": 1.5}, "1.5 N"),

@@ -15,6 +15,7 @@ ROOT = Path(__file__).parent.parent.parent
 LIMITS = {
     "deviation": "Largest deviation under the design load",
     "built_deviation": "Largest deviation as built under the design load",
+    "unloaded_deviation": "Largest deviation before any load",
     "utilisation": "Rods' stress with axial force under any load",
     "connector_turn": "Connectors' turning under any load",
     "uplift": "Uplift of a support under any load",
@@ -28,6 +29,7 @@ def test_every_limit_of_a_case_is_a_check_of_its_designs(tmp_path):
     amounts = {
         "deviation": 5e-6,
         "built_deviation": 7e-6,
+        "unloaded_deviation": 8e-6,
         "utilisation": 1e-6,
         "connector_turn": 2e-6,
         "uplift": 3e-6,
@@ -42,6 +44,7 @@ def test_every_limit_of_a_case_is_a_check_of_its_designs(tmp_path):
     assert [limits[LIMITS[name]] for name in LIMITS] == [
         f"{number(5e-3)} mm",
         f"{number(7e-3)} mm",
+        f"{number(8e-3)} mm",
         f"{number(1e-4)} % of the strength",
         f"{number(math.degrees(2e-6))} °",
         f"{number(3e-6)} N",

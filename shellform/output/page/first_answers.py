@@ -68,7 +68,8 @@ def answers(
     may pull under load."""
     row = summary.designs.get(name)
     main, more = (None if row is None else row.loads.get(load) for load in ("design", "additional"))
-    found = [] if main is None else [_how_far(main, shape_notes(summary, name))]
+    before = None if row is None else row.loads.get("none")
+    found = [] if main is None else [_how_far(main, before, shape_notes(summary, name))]
     cables = shell.cables(design)
     pull = cables.tension(states["design"]) if "design" in states else np.zeros(len(cables.ends))
     found.append(
@@ -166,11 +167,13 @@ def _stands_on(net: Net, more: LoadRecord | None, loads: Mapping[str, LoadRecord
     return Answer("What does its edge stand on?", words, f"{len(net.supports)} supports{taken}{beams}")
 
 
-def _how_far(main: LoadRecord, notes: Sequence[str]) -> Answer:
-    """Of the perfect structure, and of drawn ones beside it, which may be ten times as far off; what is to be
-    noted of that."""
+def _how_far(main: LoadRecord, before: LoadRecord | None, notes: Sequence[str]) -> Answer:
+    """Of the perfect structure, of drawn ones beside it, which may be ten times as far off, and of the braced
+    shell `before` any load, from where the concrete brings it into shape; what is to be noted of that."""
     question, good = "How far off is the shell?", None if main.stable and main.on_branch else False
     planned, mean, built = _mm(main.deviation_max), _mm(main.deviation_mean), main.built_shape
+    if before is not None:
+        notes = [f"Braced and not yet loaded it is {_mm(before.deviation_max)} off at most", *notes]
     if built is None:
         detail = ". ".join([f"{mean} in the mean, under the design load, as planned", *notes])
         return Answer(question, f"{planned} at most", detail, good)
