@@ -43,6 +43,7 @@ from shellform.run.next_trial import (
     bears_most,
     edges_may_help,
     fails_by,
+    finer_is_vain,
     more_come,
     narrowed,
     relieved,
@@ -50,7 +51,6 @@ from shellform.run.next_trial import (
     thinned,
 )
 from shellform.run.sizes import (
-    CURVED,
     MOST_CROSSINGS,
     DesignWish,
     Placed,
@@ -97,14 +97,17 @@ def first_design(
     return finished_design(found, surface, wish, say, allowance)
 
 
-def standing_design(surface: Surface, wish: DesignWish, say: Say, allowance: Allowance) -> FirstDesign:
-    """The first that stands. Raises InputError for a surface of absurd size, a flat one, or one that no net
-    covers or no rod follows, NotConverged where nothing stands; both with the reason and a way out."""
+def standing_design(
+    surface: Surface, wish: DesignWish, say: Say, allowance: Allowance, *, finer: bool = False
+) -> FirstDesign:
+    """The first that stands; spacings begin with the usual one, or where that was tried with the next
+    `finer`. Raises InputError for a surface of absurd size, a flat one, or one that no net covers or no rod
+    follows, NotConverged where nothing stands; both with the reason and a way out."""
     refuse_size(surface)
     refuse_flat(surface)
     if wish.thickness is not None:
         refuse_bulk(surface, wish.thickness, where="--thickness")
-    return _Search(surface, wish, say, allowance).that_holds()
+    return _Search(surface, wish, say, allowance).that_holds(finer=finer)
 
 
 def finished_design(
@@ -155,43 +158,45 @@ class _Search:
         ]
         return stiffer_rods(design.placed.net, possible, design.parts.choice, design.tried.stress, times)
 
-    def that_holds(self) -> FirstDesign:
+    def that_holds(self, *, finer: bool) -> FirstDesign:
         """The first that stands."""
-        spacing, reason = self._first_spacing()
-        self.reasons[spacing] = reason
+        spacing = self._finer(self._first_spacing()) if finer else self._first_spacing()
         thickness = self.wish.thickness or usual_thickness(self.surface)
         for number in range(_SPACINGS):
             if number:
-                finer = practical(_FINER * spacing)
-                if self.wish.spacing is not None or self._vain(spacing, finer):
+                if self.wish.spacing is not None or self._vain(spacing, practical(_FINER * spacing)):
                     break
-                self.reasons[finer] = f"finer than {spacing:g} m, with which the shell falls"
-                spacing = finer
+                spacing = self._finer(spacing)
             design = self._on_net(spacing, thickness)
             if design is not None:
                 return design
         return self._thinner(spacing, thickness)
 
-    def _first_spacing(self) -> tuple[float, str]:
+    def _first_spacing(self) -> float:
         if self.wish.spacing is not None:
-            return self.wish.spacing, "as asked"
-        spacing, reason = first_spacing(self.surface)
-        least = min(least_spacing(each) for each in wished(self.wish.rod, self.layers[0]))
-        return (spacing, reason) if spacing >= least else (least, "as near as rods of that depth may lie")
+            spacing, reason = self.wish.spacing, "as asked"
+        else:
+            spacing, reason = first_spacing(self.surface)
+            least = min(least_spacing(each) for each in wished(self.wish.rod, self.layers[0]))
+            if spacing < least:
+                spacing, reason = least, "as near as rods of that depth may lie"
+        self.reasons[spacing] = reason
+        return spacing
+
+    def _finer(self, spacing: float) -> float:
+        """The next finer spacing. Raises InputError for one that is too fine to solve."""
+        finer = practical(_FINER * spacing)
+        if self.surface.area > MOST_CROSSINGS * finer**2:
+            raise InputError(f"left untried, since {finer:g} m takes more crossings than a first design has")
+        self.reasons[finer] = f"finer than {spacing:g} m, with which the shell falls"
+        return finer
 
     def _vain(self, spacing: float, finer: float) -> bool:
         """Whether a finer spacing is too fine to solve, or far too little help."""
         if self.best is None:
             raise refused(self.surface, None, self.wish)
-        crossings = self.surface.area / finer**2
         ended = self.allowance.over or not self.allowance.thorough
-        if ended or self.best.spacing > spacing:  # a coarser net came nearer
-            return True
-        if crossings > (CURVED if self.best.why is Why.NET else MOST_CROSSINGS):
-            return True
-        breaks_at_once = self.best.why is Why.STRENGTH and self.best.factor == 0.0
-        falls = self.best.why is Why.STABILITY or breaks_at_once
-        return falls and self.best.factor * (spacing / finer) ** 2 < 0.5 * NEEDED
+        return ended or finer_is_vain(self.best, self.surface.area, spacing, finer)
 
     def _on_net(self, spacing: float, thickness: float) -> FirstDesign | None:
         """The first section that stands on a net of that spacing; None where none does."""
@@ -242,11 +247,9 @@ class _Search:
         those that were `tried`; None where none does that is likely to."""
         needed = NEEDED * pressure(thickness, CONCRETE)
         if hopeless(self.surface, spacing, possible[-1], needed):
-            place = sharpest(placed.net)
-            self._keep(Obstacle(Why.STABILITY, spacing, thickness, 0.0, possible[-1], placed, place))
-            self.say(
-                f"{possible[-1].label} ({possible[-1].catalogue}) and thinner: far too thin for the load"
-            )
+            most, place = possible[-1], sharpest(placed.net)
+            self._keep(Obstacle(Why.STABILITY, spacing, thickness, 0.0, most, placed, place))
+            self.say(f"{most.label} ({most.catalogue}) and thinner: far too thin for the load")
             return None
         if tried:
             at = after(placed.net, possible, tried)
@@ -261,7 +264,7 @@ class _Search:
             if isinstance(result, FirstDesign):
                 return result
             tried[at] = result
-            at = after(placed.net, possible, tried)
+            at = after(placed.net, possible, tried, last=narrows)
         return None
 
     def _thinner(self, spacing: float, thickness: float) -> FirstDesign:
@@ -360,11 +363,8 @@ class _Search:
         fall = "" if standing == DRAWN else ", the next falls"
         self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the additional load{fall}")
         if standing < DRAWN:
-            return self._keep(
-                Obstacle(
-                    Why.SCATTER, spacing, thickness, tried.factor, choice, placed, tried.where, tried.stress
-                )
-            )
+            why, where, stress = Why.SCATTER, tried.where, tried.stress
+            return self._keep(Obstacle(why, spacing, thickness, tried.factor, choice, placed, where, stress))
         material = choice.section.material
         allowed = placed.net.max_radius(young=material.young, strength=material.strength)
         return FirstDesign(
@@ -394,6 +394,7 @@ class _Search:
     def _keep(self, failure: Obstacle) -> Obstacle:
         """The failure, kept if it came nearer than those before."""
         self.failures.append(failure)
+        self.allowance.bore = max(self.allowance.bore, failure.bore(NEEDED))
         if self.best is None or failure.near(NEEDED) >= self.best.near(NEEDED):
             self.best = failure
         return failure

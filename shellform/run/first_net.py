@@ -46,12 +46,14 @@ class Allowance:
     solved; and how much is `left` of it. Seconds aren't asked, so that a surface ends at the same place on
     any machine, however busy. What a part spends the `whole` spends too, and where that is over so is the
     part. Whether it is `thorough`: climbs the ladder where no angle gives a net, and tries finer spacings
-    where no section stands; whether it `thins` concrete then. The `angle`, degrees, of the net found last."""
+    where no section stands; whether it `thins` concrete then. Of what was found last, the `angle`, degrees,
+    of the net, and what share of its load the shell `bore` at the most."""
 
     work: int = WORK
     thorough: bool = True
     thins: bool = True
     angle: float | None = None
+    bore: float = 0.0
     whole: Allowance | None = None
     left: int = field(init=False)
 

@@ -12,7 +12,7 @@ Of a shell that stands and strays too far as built walls are tried too, where ed
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from shellform.run.first_trial import FirstDesign
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish
 from shellform.run.unbuildable import Falls, Tips, Unbuildable, Why, flat_between_creases
-from shellform.run.way_out import BUILDABLE, COVERED, nearest_buildable, renewed
+from shellform.run.way_out import BUILDABLE, COVERED, Nearest, nearest_buildable, renewed
 from shellform.surface.shape.target import Surface
 
 _SHARES = (0.2, 0.5, 1.0)  # of the radius at which rods bear the load by a cautious estimate
@@ -35,6 +35,7 @@ _APART = 1.3  # from one to the next, at the least
 _FURTHER = 1.7  # times the largest radius, where it helps nothing
 _TRIED = 0.27  # of the work that a surface is worth: on rounded ones, on these again on walls, and with less concrete
 _WALLED = 0.4  # on walls, with which large nets are tried once
+_NEARLY = 0.5  # of the load needed, that a shell has to bear which is tried thoroughly
 _WALLS = "--edges wall"
 _TAKEN = "--way-out"
 Refusal = InputError | NotConverged
@@ -117,7 +118,14 @@ def _to_nearest(
     """The nearest surface that can be built, on walls where it falls otherwise; None where none was found."""
     folder = _unused(output.with_name(f"{output.stem}-{BUILDABLE}"))
     tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
-    nearest = nearest_buildable(surface, refusal.radius, folder, again, say, tried, lambda: again.options)
+
+    def nearest_of(shares: Iterable[float]) -> Nearest | None:
+        return nearest_buildable(surface, refusal.radius, folder, again, say, shares, lambda: again.options)
+
+    nearest = nearest_of(again.in_turn(tried))
+    if nearest is None and again.may_stand:
+        again.go_on()
+        nearest = nearest_of([again.best.share])
     if nearest is None:
         return None
     assert again.design is not None
@@ -143,19 +151,54 @@ def _unused(folder: Path) -> Path:
     return found
 
 
+@dataclass(frozen=True)
+class _Brief:
+    """What a brief trial came to: the `share` of the radius asked for to which the surface was rounded, the
+    `wish` it was tried with, and what share of its load the shell `bore`."""
+
+    share: float
+    wish: DesignWish
+    bore: float
+
+
 class _Rounded:
     """The search on a rounded surface for what stands, within the work of all such trials; on walls too where
-    a net covers it that falls on edge beams."""
+    a net covers it that falls on edge beams.
+
+    Trials are brief, so that rounder surfaces have their turn. Where none stands, finer spacings, for which
+    brief trials have no time, are tried on the `best` one, with all the work that is left: the one that bore
+    most, or the roundest, where no net covered any."""
 
     def __init__(self, wish: DesignWish, whole: Allowance, say: Say) -> None:
         self.design: FirstDesign | None = None  # of the last surface, where one stands
         self.wish = wish  # of which it is
         self.options = ""  # of the command, that stand for it
         self.too_late = False  # whether no work was left for even the first
+        self.best = _Brief(0.0, wish, 0.0)
+        self._finer = False
+        self._share = 0.0
         self._begun = False
         self._say = say
+        self._whole = whole
         self._brief = whole.part(_TRIED, thorough=False, thins=False)
         self._walled = whole.part(_TRIED, thorough=False)
+
+    @property
+    def may_stand(self) -> bool:
+        """Whether finer spacings are worth trying: something bore nearly enough, or nothing was covered."""
+        worth = self.best.bore >= _NEARLY or self.best.bore == 0.0 < self.best.share
+        return worth and self.wish.spacing is None and not self._whole.over
+
+    def go_on(self) -> None:
+        """With finer spacings."""
+        self._finer, self._share = True, self.best.share
+        self._brief = self._walled = self._whole.part(1.0)
+
+    def in_turn(self, shares: Sequence[float]) -> Iterator[float]:
+        """The shares of the radius, each while its surface is tried."""
+        for share in shares:
+            self._share = share
+            yield share
 
     def __call__(self, surface: Surface) -> None:
         """Raises InputError or NotConverged where no design stands."""
@@ -163,23 +206,39 @@ class _Rounded:
         self._begun = self._begun or not self.too_late
         plinths = plinths_for(surface)  # which whoever follows gets too
         surface = surface if plinths is None else plinths.surface
+        wish = self.best.wish if self._finer else self.wish
+        how = "rounded, finer" if self._finer else "rounded"
         try:
-            self.design = _trial("rounded", surface, self.wish, self._brief, self._say)
+            self.design = self._tried(how, surface, wish, self._brief)
         except (InputError, NotConverged) as error:
             covered = not (isinstance(error, Unbuildable) and error.why is Why.NET)
-            if not (covered and _on_edge_beams(surface, self.wish)):
+            if not (covered and _on_edge_beams(surface, wish)):
                 raise
             self._say(f"rounded: {error}")
-            walls = replace(self.wish, edges="wall", angle=self._brief.angle)
-            self.design = _trial("rounded, on walls", surface, walls, self._walled, self._say)
-            self.wish, self.options = replace(self.wish, edges="wall"), _WALLS
+            walls = replace(wish, edges="wall", angle=self._brief.angle)
+            self.design = self._tried(f"{how}, on walls", surface, walls, self._walled)
+
+    def _tried(self, how: str, surface: Surface, wish: DesignWish, allowance: Allowance) -> FirstDesign:
+        """The design that stands with a wish; where none does, the trial may be the best."""
+        allowance.bore, allowance.angle = 0.0, wish.angle
+        try:
+            design = _trial(how, surface, wish, allowance, self._say, finer=self._finer)
+        except (InputError, NotConverged):
+            if allowance.bore > self.best.bore or self.best.bore == 0.0:
+                self.best = _Brief(self._share, replace(wish, angle=allowance.angle), allowance.bore)
+            raise
+        if wish.edges != self.wish.edges:
+            self.wish, self.options = replace(self.wish, edges=wish.edges), _WALLS
+        return design
 
 
-def _trial(how: str, surface: Surface, wish: DesignWish, allowance: Allowance, say: Say) -> FirstDesign:
+def _trial(
+    how: str, surface: Surface, wish: DesignWish, allowance: Allowance, say: Say, *, finer: bool = False
+) -> FirstDesign:
     """What stands on another surface or with another wish, within the allowance of all such trials."""
     if allowance.over:
         raise InputError("left untried, since what was tried before took all the work that is allowed")
-    return standing_design(surface, wish, lambda text: say(f"{how}, {text}"), allowance)
+    return standing_design(surface, wish, lambda text: say(f"{how}, {text}"), allowance, finer=finer)
 
 
 def _walls_may_help(refusal: Refusal, surface: Surface, wish: DesignWish) -> bool:

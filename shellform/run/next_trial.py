@@ -10,11 +10,14 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.run.first_trial import NEEDED, PULLED, STRESSED, FirstParts, Followed
 from shellform.run.sizes import (
+    CURVED,
+    MOST_CROSSINGS,
     Placed,
     RodChoice,
     bent_to,
     load_borne,
     next_choice,
+    next_spare,
     next_thinner,
     whole_mm,
 )
@@ -70,24 +73,54 @@ def relieved(parts: FirstParts, follow: Callable[[FirstParts], Followed]) -> tup
 def edges_may_help(failure: Obstacle) -> bool:
     """Whether stronger edge beams may."""
     falls = failure.why in _FALLS
-    return failure.why is Why.EDGES or (falls and failure.nearness(NEEDED) >= _NEAR * NEEDED)
+    gives_way = failure.why in (Why.EDGES, Why.CABLES)  # cables are pulled where edges move
+    return gives_way or (falls and failure.nearness(NEEDED) >= _NEAR * NEEDED)
+
+
+def finer_is_vain(nearest: Obstacle, area: float, spacing: float, finer: float) -> bool:
+    """Whether on a surface of so much `area`, m², a `finer` spacing, m, than one that failed is too fine to
+    solve, or far too little help, by what came `nearest`."""
+    if nearest.spacing > spacing:  # a coarser net
+        return True
+    if area / finer**2 > (CURVED if nearest.why is Why.NET else MOST_CROSSINGS):
+        return True
+    breaks_at_once = nearest.why is Why.STRENGTH and nearest.factor == 0.0
+    falls = nearest.why is Why.STABILITY or breaks_at_once
+    return falls and nearest.factor * (spacing / finer) ** 2 < 0.5 * NEEDED
 
 
 def next_section(net: Net, possible: Sequence[RodChoice], at: int, failure: Obstacle) -> int:
     """The section to try after the one that failed."""
-    times = 0.0
-    if failure.why is not Why.STRENGTH:
-        times = max(1.3, (1.1 * NEEDED / max(failure.nearness(NEEDED), 0.1)) ** 1.3)
+    times = 0.0 if failure.why is Why.STRENGTH else stiffer_times(failure)
     return next_choice(net, possible, at, failure.stress, times, STRESSED)
 
 
-def after(net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]) -> int:
+def stiffer_times(failure: Obstacle) -> float:
+    """How many times as stiff rods have to be that don't fall so."""
+    return max(1.3, (1.1 * NEEDED / max(failure.nearness(NEEDED), 0.1)) ** 1.3)
+
+
+def after(
+    net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle], *, last: bool = False
+) -> int:
     """The section to try after the last of those `tried`; one of them where there is none.
 
     What is less stiff than a section that fell would fall too. So where what a failure asks for was tried
     before, or fell, and rods broke under the load, it is one between those: stiffer than all that fell, and
     less deep than what broke least, by what its stress asks for, or by half the way there.
+
+    What a shell is stressed to that lies on the ground says nothing of one that stands. So where that leaves
+    none, and these are the `last` layers, it is one as much stiffer as the fall asks for, if that leaves a
+    third of its strength to the load, or else the stiffest that does.
     """
+    found, (at, failure) = _after(net, possible, tried), list(tried.items())[-1]
+    if found not in tried or not last or failure.why is not Why.STABILITY:
+        return found
+    return next_spare(net, possible, at, stiffer_times(failure))
+
+
+def _after(net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]) -> int:
+    """By what the sections are likely to be stressed to."""
     at, failure = list(tried.items())[-1]
     found = next_section(net, possible, at, failure)
     fallen, least = _stiffest_fallen(tried), _least_broken(tried)

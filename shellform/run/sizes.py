@@ -285,8 +285,7 @@ def next_choice(
     at least so many `times` as stiff and whose stress is likely to be `most` at the most, else the stiffest
     such one; with 0 `times` the one that is likely to be stressed least. `at` where there is none.
 
-    Bending into the net stresses every section as it is; what the load adds goes with the moment that it
-    bears.
+    Bending into the net stresses each section as it is; what the load adds goes with the moment it bears.
     """
     own, bent = possible[at], [_bent(net, each) for each in possible]
     added = max(stress - bent[at], 0.0)
@@ -295,6 +294,14 @@ def next_choice(
     if not times:
         return min(fit, key=likely.__getitem__, default=at)
     return next((k for k in fit if possible[k].bending >= times * own.bending), fit[-1] if fit else at)
+
+
+def next_spare(net: Net, possible: Sequence[RodChoice], at: int, times: float) -> int:
+    """The least stiff of the sections that are at least so many `times` as stiff as that `at` and leave a
+    third of their strength to the load, else the stiffest that does; `at` where none is stiffer."""
+    spare = [k for k, each in enumerate(possible) if _bent(net, each) <= _BENT]
+    enough = (k for k in spare if possible[k].bending >= times * possible[at].bending)
+    return max(next(enough, spare[-1] if spare else at), at)
 
 
 def next_thinner(possible: Sequence[RodChoice], at: int, share: float) -> int:

@@ -145,6 +145,13 @@ class Obstacle(Record):
         """
         return min(self.factor, 0.9 * needed) if self.why is Why.SCATTER else self.factor
 
+    def bore(self, needed: float) -> float:
+        """About what share of the load that is `needed` the shell bore. What rods are stressed to that fell
+        says nothing of it."""
+        share = self.nearness(needed) / needed
+        breaks = self.why in (Why.STRENGTH, Why.EDGES, Why.CABLES)
+        return share / max(self.stress, 1.0) if breaks else share
+
     def eases(self, before: Obstacle, needed: float) -> float:
         """How many times as much of its load as with the failure `before` the shell bears; once it bears what
         is `needed`, times how many times less it is stressed."""

@@ -7,7 +7,7 @@ surface as given. Beside it stands a map of the change.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -58,7 +58,7 @@ def nearest_buildable(
     folder: Path,
     again: Callable[[Surface], object],
     say: Callable[[str], None] = lambda text: None,
-    shares: Sequence[float] = MORE,
+    shares: Iterable[float] = MORE,
     options: Callable[[], str] = lambda: "",
 ) -> Nearest | None:
     """The nearest buildable surface, written into `folder` as surface.obj, surface.step, change.vtu and

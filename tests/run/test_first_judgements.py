@@ -279,7 +279,7 @@ def test_rods_edge_beams_and_cables_are_judged_under_the_additional_load(monkeyp
         (Why.STABILITY, 1.19, False),
         (Why.SCATTER, 1.5, True),
         (Why.STRENGTH, 1.5, False),
-        (Why.CABLES, 1.5, False),
+        (Why.CABLES, 1.5, True),
         (Why.NET, 0.0, False),
     ],
 )
@@ -393,12 +393,13 @@ def test_for_the_sake_of_curvature_no_spacing_is_tried_of_more_than_six_hundred_
 
 
 def test_of_two_failures_that_came_as_near_the_later_is_kept():
-    search = SimpleNamespace(failures=[], best=None)
+    search = SimpleNamespace(failures=[], best=None, allowance=SimpleNamespace(bore=0.4))
     first, nearer, as_near, farther = (Obstacle(Why.STABILITY, 0.5, 0.05, f) for f in (0.5, 0.8, 0.8, 0.6))
     for failure, best in ((first, first), (nearer, nearer), (as_near, as_near), (farther, as_near)):
         assert _Search._keep(search, failure) is failure
         assert search.best is best
     assert search.failures == [first, nearer, as_near, farther]
+    assert search.allowance.bore == pytest.approx(0.8 / 1.5), "the most of its load that it bore"
 
 
 @pytest.mark.parametrize(
@@ -517,7 +518,7 @@ def test_sections_are_narrowed_down_only_where_no_more_layers_come(monkeypatch, 
     monkeypatch.setattr(search, "_stands", lambda placed, choice, *_: tried.append(choice) or "falls")
     monkeypatch.setattr(first_design, "hopeless", lambda *_: False)
     monkeypatch.setattr(first_design, "first_choice", lambda *_: 0)
-    monkeypatch.setattr(first_design, "after", lambda net, possible, tried: len(tried))
+    monkeypatch.setattr(first_design, "after", lambda net, possible, tried, last: len(tried))
     monkeypatch.setattr(first_design, "narrowed", lambda *_: narrowed)
     assert search._first_that_stands(SimpleNamespace(net=None), row, 0.5, 0.05) is None
     assert tried == row[:trials]

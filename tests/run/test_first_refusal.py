@@ -67,7 +67,7 @@ def test_a_way_out_stands_instead_of_a_radius_that_nobody_tried_and_beside_other
 def test_walls_are_offered_with_their_height_where_a_design_stands_on_them(monkeypatch, stands):
     tried, said = [], []
 
-    def search(surface, wish, say, allowance):
+    def search(surface, wish, say, allowance, *, finer=False):
         tried.append(wish.edges)
         if not stands:
             raise NotConverged("falls")
@@ -131,7 +131,7 @@ def test_of_a_shell_that_falls_the_layer_that_stood_is_tried_from_the_start_befo
     case."""
     asked_for = []
 
-    def search(surface, wish, say, allowance):
+    def search(surface, wish, say, allowance, *, finer=False):
         asked_for.append(wish.thickness)
         if not stands:
             raise NotConverged("falls")

@@ -114,6 +114,30 @@ def test_between_sections_that_fell_and_those_that_broke_others_are_tried(monkey
     assert next_trial.narrowed(ROW, failures) == (then not in tried)
 
 
+@pytest.mark.parametrize(
+    ("last", "why", "spare", "then"),
+    [
+        (True, Why.STABILITY, 2, 2),
+        (True, Why.STABILITY, 0, 0),  # tried before: the end
+        (False, Why.STABILITY, 2, 1),  # two layers come
+        (True, Why.STRENGTH, 2, 1),
+        (True, Why.SCATTER, 2, 1),
+    ],
+)
+def test_after_a_shell_that_lies_on_the_ground_come_stiffer_rods_whatever_it_is_stressed_to(
+    monkeypatch, last, why, spare, then
+):
+    """Two layers of 22 mm fell at 0.90 of a load, at 3.6 times their strength: no others were tried."""
+    asked = []
+    monkeypatch.setattr(next_trial, "next_spare", lambda *how: asked.append(how) or spare)
+    monkeypatch.setattr(next_trial, "next_section", lambda *_: 1)
+    tried = {0: failed(Why.STABILITY, 0.3), 1: failed(why, 0.75, 3.6)}
+    assert next_trial.after("net", SOME, tried, last=last) == then
+    assert asked == ([("net", SOME, 1, pytest.approx(2.2**1.3))] if then != 1 else [])
+    monkeypatch.setattr(next_trial, "next_section", lambda *_: 2)
+    assert next_trial.after("net", SOME, tried, last=last) == 2, "one is likely to bear it"
+
+
 @pytest.mark.parametrize("tried", [{2: Why.STABILITY}, {6: Why.STRENGTH}, {2: Why.EDGES, 6: Why.STRENGTH}])
 def test_sections_are_narrowed_down_only_between_one_that_fell_and_one_that_broke(tried):
     assert not next_trial.narrowed(ROW, {k: failed(why) for k, why in tried.items()})
@@ -160,6 +184,7 @@ def test_of_the_failures_with_as_much_concrete_and_spacing_the_one_that_bears_mo
         (1.21, Why.STABILITY, True),
         (1.19, Why.STABILITY, False),
         (1.0, Why.EDGES, True),
+        (1.6, Why.CABLES, True),
         (1.6, Why.STRENGTH, False),
     ],
 )

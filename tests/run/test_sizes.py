@@ -228,6 +228,16 @@ def test_after_a_section_comes_the_least_stiff_that_is_stiff_enough_and_likely_t
     assert following(1.5, 0.6, 0.3) == 1, "less than bending takes adds nothing"
 
 
+def test_after_what_fell_come_the_least_stiff_rods_that_are_stiff_enough_and_have_strength_to_spare(known):
+    some = [
+        section(0.01, 2.0, share=0.5), section(0.01, 4.0, share=0.66), section(0.01, 5.0, share=0.65),
+        section(0.01, 8.0, share=0.6), section(0.01, 9.0, share=0.7),
+    ]  # fmt: skip
+    assert [sizes.next_spare(None, some, 0, times) for times in (1.5, 2.5, 2.6, 4.0, 99.0)] == [2, 2, 3, 3, 3]
+    assert sizes.next_spare(None, some, 4, 1.3) == 4, "none is stiffer"
+    assert sizes.next_spare(None, [section(0.01, 2.0, share=0.7)], 0, 1.3) == 0
+
+
 def test_the_stiffest_section_that_is_so_much_less_deep_comes_where_bending_breaks_rods():
     some = [section(depth) for depth in (0.004, 0.008, 0.006, 0.01)]
     assert sizes.next_thinner(some, 3, 0.8) == 2

@@ -182,6 +182,24 @@ def test_what_eases_a_failure_is_told_in_times_its_load_and_less_stress(factor, 
     assert own.eases(former, NEEDED) == pytest.approx(eases)
 
 
+@pytest.mark.parametrize(
+    ("why", "factor", "stress", "bore"),
+    [
+        (Why.STABILITY, 0.9, 3.6, 0.6),  # what it is stressed to on the ground says nothing
+        (Why.SCATTER, 1.5, 0.8, 0.9),
+        (Why.STRENGTH, 1.5, 1.25, 0.8),
+        (Why.STRENGTH, 1.5, 0.97, 1.0),
+        (Why.CABLES, 1.5, 2.0, 0.5),
+        (Why.EDGES, 1.5, 1.6, 0.625),
+        (Why.NET, 0.0, 0.0, 0.0),
+    ],
+)
+def test_what_a_shell_bore_is_the_share_up_to_which_it_stood_or_was_stressed_no_more_than_it_may(
+    why, factor, stress, bore
+):
+    assert Obstacle(why, 0.5, 0.05, factor, stress=stress).bore(NEEDED) == pytest.approx(bore)
+
+
 def test_rods_break_unloaded_where_two_thicknesses_of_concrete_point_beyond_what_they_may_bear():
     """From 1.4 at 50 mm to 1.2 at 30 mm: 0.9 at none."""
     choice = rods()

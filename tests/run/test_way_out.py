@@ -104,7 +104,7 @@ def test_where_no_rounded_surface_helps_a_first_layer_of_concrete_is_offered_if_
 ):
     tried = []
 
-    def search(surface, wish, say, allowance):
+    def search(surface, wish, say, allowance, *, finer=False):
         tried.append(wish.thickness)
         if not (stands and wish.thickness):
             raise InputError("no", where="rod")
@@ -129,7 +129,7 @@ def test_where_no_rounded_surface_helps_a_first_layer_of_concrete_is_offered_if_
 def test_a_rounded_surface_that_falls_on_edge_beams_is_offered_on_walls(tmp_path, monkeypatch):
     tried = []
 
-    def search(surface, wish, say, allowance):
+    def search(surface, wish, say, allowance, *, finer=False):
         tried.append(wish.edges)
         if wish.edges != "wall":
             raise NotConverged("falls", residual=0.0, iterations=0)
@@ -151,9 +151,61 @@ def test_a_rounded_surface_that_falls_on_edge_beams_is_offered_on_walls(tmp_path
     assert named(told).stat().st_mtime_ns == before
 
 
+@pytest.mark.parametrize(
+    ("bore", "stands", "tried"),
+    [
+        (0.6, True, [("wall", 30.0)]),
+        (0.6, False, [("wall", 30.0)]),
+        (0.49, True, []),  # none came near
+        (0.0, True, [("auto", None)]),  # no net covers any of them: the roundest
+    ],
+)
+def test_finer_spacings_are_tried_on_the_rounded_surface_that_came_nearest_where_none_stood(
+    tmp_path, monkeypatch, bore, stands, tried
+):
+    """A roof of 14 m with four arched doors stands on rods every 0.6 m and falls on those every 0.85 m."""
+    brief, finely = [], []
+
+    def search(surface, wish, say, allowance, *, finer):
+        if finer:
+            finely.append((wish.edges, wish.angle, surface.vertices[:, 2].max()))
+            assert allowance.thorough
+            assert allowance.thins
+            if stands:
+                return STANDS
+        else:
+            brief.append((wish.edges, surface.vertices[:, 2].max()))
+            assert not allowance.thorough
+        if bore == 0.0:
+            raise refusal
+        allowance.angle = 30.0
+        allowance.bore = bore if len(brief) == 4 else 0.3  # the second, on walls
+        raise NotConverged("falls", residual=0.0, iterations=0)
+
+    monkeypatch.setattr(first_refusal, "standing_design", search)
+    refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
+    found = first_refusal.with_ways_out(
+        refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", lambda text: None
+    )
+    assert [each[:2] for each in finely] == tried
+    if tried and stands:
+        assert finely[0][2] == brief[3 if bore else -1][1], "the very same surface"
+        assert found.way_out.design is STANDS
+        assert found.way_out.wish == DesignWish(edges=tried[0][0])
+        assert ("(in metres, with --edges wall)" in found.offered.remedy) == (tried[0][0] == "wall")
+    else:
+        assert found.way_out is None
+    again = first_refusal.with_ways_out(
+        refusal, sheet(gable), DesignWish(spacing=0.5), tmp_path / "case.toml", lambda text: None
+    )
+    assert again.way_out is None, "another spacing was asked for"
+
+
 def test_a_rounded_surface_is_tried_on_the_plinths_that_whoever_follows_gets(tmp_path, monkeypatch):
     cut, tried = sheet(lambda x, y: 2.0 - 0.02 * y * y), []
-    monkeypatch.setattr(first_refusal, "standing_design", lambda surface, *_: tried.append(surface) or STANDS)
+    monkeypatch.setattr(
+        first_refusal, "standing_design", lambda surface, *_, **__: tried.append(surface) or STANDS
+    )
     monkeypatch.setattr(first_refusal, "plinths_for", lambda surface: Plinths(cut, 0.1, 0.1, 0.5))
     refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
     told = first_refusal.with_ways_out(
@@ -174,7 +226,7 @@ def test_of_a_radius_that_nobody_asked_for_no_remedy_is_told(tmp_path):
 
 
 def test_no_way_out_is_begun_once_the_work_is_done_that_a_surface_is_worth(tmp_path, monkeypatch):
-    def search(surface, wish, say, allowance):
+    def search(surface, wish, say, allowance, *, finer=False):
         raise AssertionError("too late")
 
     monkeypatch.setattr(first_refusal, "standing_design", search)
