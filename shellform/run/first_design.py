@@ -312,14 +312,14 @@ class _Search:
         self, placed: Placed, choice: RodChoice, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
         """The design with these rods and this load, and the lightest edge beams with which it stands. Single
-        rods of which drawn structures fall give way to two layers, which cost no more and spare more than
-        heavier edge beams."""
+        rods of which drawn structures fall, or whose cables are pulled too much, give way to two layers,
+        which cost no more and spare more than heavier edge beams."""
         spare = more_come(choice, self.layers)
         for edge in edge_choices(choice)[self.lightest : self.lightest + HEAVY]:
             result = self.with_edges(placed, choice, edge, spacing, thickness)
             if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result)):
                 break
-            if spare and result.why is Why.SCATTER:
+            if spare and result.why in (Why.SCATTER, Why.CABLES):
                 break
         return result
 

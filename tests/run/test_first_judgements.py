@@ -290,6 +290,7 @@ def test_stronger_edge_beams_are_tried_where_edges_give_way_or_the_shell_nearly_
 GIVES_WAY = Obstacle(Why.EDGES, 0.5, 0.05, 1.5, stress=1.2)
 BREAKS = Obstacle(Why.STRENGTH, 0.5, 0.05, 1.5, stress=1.2)
 SCATTERS = Obstacle(Why.SCATTER, 0.5, 0.05, 1.5, stress=0.5)
+PULLS = Obstacle(Why.CABLES, 0.5, 0.05, 1.5, stress=1.3)
 
 
 @pytest.mark.parametrize(
@@ -301,6 +302,8 @@ SCATTERS = Obstacle(Why.SCATTER, 0.5, 0.05, 1.5, stress=0.5)
         (0, ("line",), (1, 2), [STANDS], [0]),
         (0, (), (1, 2), [GIVES_WAY], [0]),  # there are none
         (0, ("line",), (1, 2), [SCATTERS], [0]),  # two layers come first
+        (0, ("line",), (1, 2), [PULLS], [0]),
+        (0, ("line",), (1,), [PULLS, PULLS], [0, 1]),
         (0, ("line",), (1,), [SCATTERS, SCATTERS], [0, 1]),  # but none are left to try
     ],
 )
