@@ -188,7 +188,7 @@ class _Search:
         finer = practical(_FINER * spacing)
         if self.surface.area > MOST_CROSSINGS * finer**2:
             raise InputError(f"left untried, since {finer:g} m takes more crossings than a first design has")
-        self.reasons[finer] = f"finer than {spacing:g} m, with which the shell falls"
+        self.reasons[finer] = f"finer than {spacing:g} m, with which none stands"
         return finer
 
     def _vain(self, spacing: float, finer: float) -> bool:
