@@ -177,7 +177,7 @@ class _Rounded:
         self.best = _Brief(0.0, wish, 0.0)
         self._finer = False
         self._share = 0.0
-        self._begun = False
+        self._begun = self._covered = False
         self._say = say
         self._whole = whole
         self._brief = whole.part(_TRIED, thorough=False, thins=False)
@@ -186,7 +186,7 @@ class _Rounded:
     @property
     def may_stand(self) -> bool:
         """Whether finer spacings are worth trying: something bore nearly enough, or nothing was covered."""
-        worth = self.best.bore >= _NEARLY or self.best.bore == 0.0 < self.best.share
+        worth = self.best.bore >= _NEARLY or (self._begun and not self._covered)
         return worth and self.wish.spacing is None and not self._whole.over
 
     def go_on(self) -> None:
@@ -212,6 +212,7 @@ class _Rounded:
             self.design = self._tried(how, surface, wish, self._brief)
         except (InputError, NotConverged) as error:
             covered = not (isinstance(error, Unbuildable) and error.why is Why.NET)
+            self._covered = self._covered or covered
             if not (covered and _on_edge_beams(surface, wish)):
                 raise
             self._say(f"rounded: {error}")
