@@ -199,11 +199,9 @@ def bears_most(failures: Sequence[Obstacle], nearest: Obstacle) -> Obstacle:
     def borne(failure: Obstacle) -> float:
         if failure.choice is None or failure.placed is None:
             return 0.0
-        share = failure.nearness(NEEDED) / NEEDED
-        if failure.why in (Why.EDGES, Why.CABLES):
-            return share / failure.stress
         if failure.why is not Why.STRENGTH:
-            return share
+            return failure.bore(NEEDED)
+        share = failure.nearness(NEEDED) / NEEDED
         return min(share, load_borne(failure.placed.net, failure.choice, failure.stress, AIMED))
 
     alike = [

@@ -149,8 +149,9 @@ class Obstacle(Record):
         """About what share of the load that is `needed` the shell bore. What rods are stressed to that fell
         says nothing of it."""
         share = self.nearness(needed) / needed
-        breaks = self.why in (Why.STRENGTH, Why.EDGES, Why.CABLES)
-        return share / max(self.stress, 1.0) if breaks else share
+        if self.why is Why.STRENGTH:
+            return share / max(self.stress, 1.0)
+        return share / self.stress if self.why in (Why.EDGES, Why.CABLES) else share
 
     def eases(self, before: Obstacle, needed: float) -> float:
         """How many times as much of its load as with the failure `before` the shell bears; once it bears what
