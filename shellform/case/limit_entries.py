@@ -16,9 +16,12 @@ class LimitsEntry(Entry):
     deviation: PositiveFloat | None = Field(
         None, description="largest distance of a node from its place under the design load, m"
     )
-    built_deviation: PositiveFloat | None = Field(None, description="the same as built, at worst, m")
+    built_deviation: PositiveFloat | None = Field(
+        None,
+        description="largest distance of a node from its place under the design load as built, at worst, m",
+    )
     unloaded_deviation: PositiveFloat | None = Field(
-        None, description="the same of the braced shell before any load, m"
+        None, description="largest distance of a node from its place in the braced shell before any load, m"
     )
     utilisation: PositiveFloat | None = Field(
         None,
