@@ -336,6 +336,8 @@ def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
         "--output",
         run,
         "--set",
+        "net.elements=2",
+        "--set",
         "optimise.evaluations=5",
         "--set",
         "optimise.polish=3",
