@@ -334,7 +334,8 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
 
 
 def test_a_free_radius_is_rounded_up_and_the_neighbouring_sections_are_tried(tmp_path):
-    settings = ["optimise.evaluations=5", "optimise.rounded=2", "optimise.polish=0", "joint.gap=0.0045"]
+    settings = ["net.elements=2", "optimise.evaluations=5", "optimise.rounded=2", "optimise.polish=0"]
+    settings.append("joint.gap=0.0045")
     case, heard = load_case(ROOT / "scripts/scale_model_rounded.toml", settings), []
     summary = run_case(case, tmp_path, until="optimise", report=heard.append)
     (doubt,) = [each for each in heard if "the rods that were found" in each.text]

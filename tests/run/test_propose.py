@@ -498,6 +498,7 @@ def test_joints_turn_where_cables_are_made_slacker_for_rods_that_are_stressed_to
     assert least.easier(breaks, PULLED) == replace(least, swivels=True)
 
 
+@pytest.mark.slow
 def test_a_half_sphere_is_designed_with_joints_that_turn(tmp_path):
     """Joints that resist turning stress its rods to 106 % or more, whichever rods and spacing."""
     x, y, _ = dish(size=2.0, rise=0.0, count=29).vertices.T
