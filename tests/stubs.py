@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 from shellform.study.jobs import Overtime, ended_where_it_hangs
 from shellform.study.outcome import Outcome, Status, flat
@@ -37,6 +38,13 @@ misfit_rms_additional = 0.005
 evaluations = 3
 polish = 0
 """
+
+
+class Known(SimpleNamespace):
+    """What is known of a record; like one, it equals itself only."""
+
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
 
 
 def study_file(folder, text):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
-from shellform.arrays import Indices
+from shellform.arrays import Indices, indices
 from shellform.net.grid import cells, edge_diagonals
 from shellform.net.net import Net
 from shellform.surface.shape.locate import Locator
@@ -13,6 +15,7 @@ from shellform.surface.shape.target import Surface
 _SAMPLES = (0.25, 0.5, 0.75)  # where along a cable its height over the surface is taken
 
 
+@lru_cache(maxsize=1)  # of one net for every rod that is tried on it
 def candidate_cables(net: Net, below: Surface, *, edge_cells: bool) -> Indices:
     """Ends (c, 2) of the candidates: both diagonals of every cell whose corners are all joints, and with
     `edge_cells` behind them the one of every cell at the edge that has three; those that rise above the
@@ -27,4 +30,4 @@ def candidate_cables(net: Net, below: Surface, *, edge_cells: bool) -> Indices:
     above = np.zeros(len(ends), dtype=bool)
     for share in _SAMPLES:
         above |= finder.foot((1.0 - share) * place[:, 0] + share * place[:, 1]).distance > 0.0
-    return np.asarray(ends[~above])
+    return indices("ends", ends[~above], (None, 2), below=net.node_count)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -151,7 +152,15 @@ def area_load(net: Net, surface: Surface, weight: float, region: Region = EVERYW
     region's area.
     """
     require_number(weight, above=0.0, where="load.weight", give="N/m², such as 120")
-    return _down(weight * tributary(net, lying(surface, region)))
+    carried = (
+        _carried_everywhere(net, surface) if region is EVERYWHERE else tributary(net, lying(surface, region))
+    )
+    return _down(weight * carried)
+
+
+@lru_cache(maxsize=1)  # concrete, membranes and every thickness that is tried lie on one net
+def _carried_everywhere(net: Net, surface: Surface) -> Reals:
+    return reals("areas", tributary(net, lying(surface, EVERYWHERE)), (None,))
 
 
 def concrete(

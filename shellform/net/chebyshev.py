@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -152,6 +153,11 @@ def pull_net(
     return net_at(surface, settings, angle=angle, offset=offset, progress=progress)
 
 
+@lru_cache(maxsize=2)  # of each margin: nets at several angles are pulled onto one surface
+def _locator(surface: Surface, reach: float) -> Locator:
+    return Locator(surface, reach=reach)
+
+
 @dense_on_one()
 def net_at(
     surface: Surface,
@@ -168,7 +174,7 @@ def net_at(
     limits = _limits(settings)
     density = _densities(settings.spring_density, settings.start)
     for margin in _MARGINS:
-        finder = Locator(surface, reach=(margin + _BEYOND) * max(steps))
+        finder = _locator(surface, (margin + _BEYOND) * max(steps))
         origin = (
             origin_at(surface, finder, steps, angle=angle, offset=offset)
             if settings.guides is None

@@ -18,8 +18,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from shellform import quantities
 from shellform.errors import InputError, require_number
 from shellform.gridshell.catalogue import Catalogue, label, named, read_catalogue
@@ -28,10 +26,9 @@ from shellform.gridshell.layers import TwoLayers, layers_of, locked_bending
 from shellform.gridshell.tolerances import tolerances_of_size
 from shellform.net.net import Net
 from shellform.structure.elements.sections import Section, mass_per_length
-from shellform.surface.shape.target import Surface, curvature, vertex_areas, width
+from shellform.surface.shape.bends import curvature_mean_square, curvature_shown, curvature_usual
+from shellform.surface.shape.target import Surface, width
 
-SHOWN = 0.95  # of the surface's area keeps the curvature by which cells are sized
-_USUALLY = 0.75  # of its area: what is curved more may be creases, which bear nothing
 _HOPELESS = 0.03  # of the load needed, by the estimate: rods of a tenth of the depth that is needed
 _BUCKLES = (
     0.3  # of the load needed, at which rods buckle between their joints: a sphere's thrust is a rough guess
@@ -156,22 +153,6 @@ class Placed:
     net: Net
     angle: float
     offset: tuple[float, float]
-
-
-def curvature_shown(surface: Surface) -> float:
-    """The larger principal curvature, 1/m, that all but a twentieth of the surface keeps."""
-    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface.vertices, surface.triangles)
-    order = np.argsort(bent)
-    share = np.cumsum(weight[order]) / weight.sum()
-    return float(bent[order][min(int(np.searchsorted(share, SHOWN)), len(bent) - 1)])
-
-
-def curvature_usual(surface: Surface) -> float:
-    """The larger principal curvature, 1/m, that three quarters of the surface keep: how it would be curved
-    without its creases."""
-    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface.vertices, surface.triangles)
-    order = np.argsort(bent)
-    return float(bent[order][np.searchsorted(np.cumsum(weight[order]), _USUALLY * weight.sum())])
 
 
 def first_spacing(surface: Surface) -> tuple[float, str]:
@@ -391,10 +372,5 @@ def bent_to(choice: RodChoice) -> float:
 
 def buckling_load(surface: Surface, spacing: float, bending: float, rope: Rope) -> float:
     """About what load, N/m², the braced grid of rods with EI `bending`, N·m², buckles under."""
-    mean = float(
-        np.average(
-            (curvature(surface) ** 2).mean(axis=1), weights=vertex_areas(surface.vertices, surface.triangles)
-        )
-    )
     across, shear = bending / spacing, rope.stiffness / (math.sqrt(2.0) * spacing)
-    return _BUCKLING * math.sqrt(across * shear) * mean
+    return _BUCKLING * math.sqrt(across * shear) * curvature_mean_square(surface)

@@ -25,9 +25,10 @@ from shellform.net.refusal import NoNet, Stalled
 from shellform.quantities import coordinates, number
 from shellform.run.first_net import bends_to
 from shellform.run.first_trial import NEEDED, STRESSED
-from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_usual, least_spacing, radius_for
+from shellform.run.sizes import DesignWish, Placed, RodChoice, least_spacing, radius_for
 from shellform.run.way_out import COVERED
 from shellform.surface.readers.reading import states_unit
+from shellform.surface.shape.bends import curvature_usual
 from shellform.surface.shape.target import Surface, sharpest_bend
 from shellform.surface.units import METRES
 

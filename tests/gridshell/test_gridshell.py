@@ -14,6 +14,7 @@ from shellform.gridshell.layers import LOCK
 from shellform.net.grid import CONNECTOR, ROD
 from shellform.structure.elements.beam import make_beams
 from shellform.structure.elements.state import at_rest
+from tests.stubs import Known
 
 FLAT = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.5, 0.0], [3.0, 4.0, 0.0]])
 TARGET = FLAT + np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.9], [0.0, 0.0, 0.8], [-0.4, -0.5, 0.6]])
@@ -129,7 +130,7 @@ def test_a_round_rod_of_a_material_that_is_not_told_contracts_by_three_tenths():
 
 CURVATURE = np.zeros((2, 2, 2))
 CURVATURE[1, 0] = [0.3, -0.4]  # of a round rod 0.5 / m together
-NET = SimpleNamespace(
+NET = Known(
     quality=SimpleNamespace(curvature=CURVATURE, curvature_max=0.5),
     grid=SimpleNamespace(gap=0.05, spacing=1.0, spacing_v=1.0),
 )
@@ -175,10 +176,11 @@ def test_no_cable_is_laid_that_rises_above_the_surface_at_a_quarter_a_half_or_th
     grid = SimpleNamespace(
         gap=0.05, spacing=1.0, spacing_v=1.0, crossing_nodes=np.column_stack([lattice, lattice])
     )
-    net = SimpleNamespace(
+    net = Known(
         quality=SimpleNamespace(curvature=0.0 * CURVATURE, curvature_max=0.0),
         grid=grid,
         target=SimpleNamespace(positions=place),
+        node_count=4,
     )
     monkeypatch.setattr(
         candidates, "cells", lambda _grid: np.array([[0, 1, 2, 3]])
@@ -194,7 +196,7 @@ def test_no_cable_is_laid_that_rises_above_the_surface_at_a_quarter_a_half_or_th
         monkeypatch.setattr(candidates, "Locator", lambda _surface: SimpleNamespace(foot=foot))
         rod = sf.Rod.round(young=40e9, radius=0.004)
         joint = sf.Joint(axial=5.0, torsion=6.0, bending=8.0, gap=0.05)
-        return brace(net, rod, joint, sf.Cable(stiffness=1.0), below=None, **how)[4].tolist()
+        return brace(net, rod, joint, sf.Cable(stiffness=1.0), below=Known(), **how)[4].tolist()
 
     assert laid([[9.0, 9.0, 9.0]]) == [[0, 2], [1, 3]]
     assert laid([[9.0, 9.0, 9.0]], edge_cells=True) == [[0, 2], [1, 3], [0, 3]]

@@ -11,10 +11,12 @@ import shellform as sf
 from shellform.errors import InputError
 from shellform.run import sizes
 from shellform.run.sizes import DesignWish, RodChoice, Rope
+from shellform.surface.shape import bends
+from tests.stubs import Known
 
 
 def surface(**known):
-    return SimpleNamespace(vertices=None, triangles=None, **known)
+    return Known(vertices=None, triangles=None, **known)
 
 
 @pytest.fixture
@@ -22,37 +24,11 @@ def bent(monkeypatch):
     """Sets a surface's principal curvatures, 1/m, and the areas at its points."""
 
     def is_bent(curvatures, areas):
-        monkeypatch.setattr(sizes, "curvature", lambda _: np.array(curvatures))
-        monkeypatch.setattr(sizes, "vertex_areas", lambda *_: np.array(areas))
+        monkeypatch.setattr(bends, "curvature", lambda _: np.array(curvatures))
+        monkeypatch.setattr(bends, "vertex_areas", lambda *_: np.array(areas))
         return surface()
 
     return is_bent
-
-
-FOUR = [
-    [0.0, -0.1],
-    [0.4, 0.2],
-    [-0.2, 0.1],
-    [0.3, -0.1],
-]  # by rising curvature: the first, third, fourth, second
-
-
-@pytest.mark.parametrize(
-    ("areas", "shown", "usual"),
-    [
-        ((60.0, 2.0, 36.0, 2.0), 0.2, 0.2),
-        ((60.0, 2.0, 34.0, 4.0), 0.3, 0.2),
-        ((74.0, 6.0, 10.0, 10.0), 0.4, 0.2),
-        ((7.6, 0.2, 1.0, 1.2), 0.3, 0.1),
-        ((10.0, 10.0, 10.0, 10.0), 0.4, 0.3),
-    ],
-)
-def test_a_twentieth_of_the_area_is_left_out_of_the_curvature_shown_and_a_quarter_of_the_usual(
-    bent, areas, shown, usual
-):
-    own = bent(FOUR, areas)
-    assert sizes.curvature_shown(own) == shown
-    assert sizes.curvature_usual(own) == usual
 
 
 def test_buckling_goes_with_the_root_of_both_stiffnesses_and_the_mean_square_of_the_curvatures(bent):

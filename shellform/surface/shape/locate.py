@@ -107,7 +107,7 @@ def _joined(across: Indices, triangles: Indices) -> tuple[Indices, Indices]:
     return coded, np.ascontiguousarray(np.column_stack([pieces, before, after]))
 
 
-def _edge_pieces(surface: Surface, loops: list[Indices]) -> Reals:
+def _edge_pieces(surface: Surface, loops: tuple[Indices, ...]) -> Reals:
     """Straight pieces (m, 3, 3) of the smooth curves over edge loops, as triangles without width."""
     a, b = np.concatenate(loops), np.concatenate([np.roll(loop, -1) for loop in loops])
     points = np.empty((len(a), _PIECES + 1, 3))

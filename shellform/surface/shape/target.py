@@ -8,6 +8,7 @@ jets (jets.py).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -49,7 +50,7 @@ class Surface(Record):
             f"Surface({len(self.triangles)} triangles, {size} m{f', {self.source}' if self.source else ''})"
         )
 
-    @property
+    @cached_property
     def area(self) -> float:
         """m², of the triangles."""
         return float(triangle_areas(self.vertices, self.triangles).sum())
@@ -59,15 +60,26 @@ class Surface(Record):
         """Extents (3,), m, along x, y and z."""
         return np.asarray(np.ptp(self.vertices, axis=0))
 
-    @property
-    def boundary(self) -> list[Indices]:
+    @cached_property
+    def boundary(self) -> tuple[Indices, ...]:
         """The closed loops of vertices round the surface and round its holes, the longest, in metres,
         first.
         """
         across = across_edges(self.triangles, len(self.vertices))
         at = np.argwhere(across < 0)
         rim = np.column_stack([self.triangles[at[:, 0], (at[:, 1] + k) % 3] for k in (0, 1)])
-        return sorted(closed_loops(rim), key=lambda loop: -_length(self.vertices[loop]))
+        loops = sorted(closed_loops(rim), key=lambda loop: -_length(self.vertices[loop]))
+        return tuple(indices("boundary", loop, (None,), below=len(self.vertices)) for loop in loops)
+
+    @cached_property
+    def _curvature(self) -> Reals:
+        return reals("curvature", jets(self.vertices, self.triangles, self.normals)[1], (None, 2))
+
+    @cached_property
+    def _width(self) -> float:
+        turns = np.linspace(0.0, np.pi, 180, endpoint=False)
+        along = self.vertices[:, :2] @ np.vstack([np.cos(turns), np.sin(turns)])
+        return float(np.ptp(along, axis=0).min())
 
     @property
     def holes(self) -> int:
@@ -114,7 +126,7 @@ def make_surface(
 
 def curvature(surface: Surface) -> Reals:
     """Principal curvatures (v, 2), 1/m, positive where the surface bends away from its upper side."""
-    return jets(surface.vertices, surface.triangles, surface.normals)[1]
+    return surface._curvature
 
 
 def largest_curvature(surface: Surface) -> float:
@@ -141,9 +153,7 @@ def sharpest_bend(surface: Surface) -> tuple[int, float]:
 def width(surface: Surface) -> float:
     """The least extent, m, of its plan in any direction, to within a hundredth of the largest: what a shell
     spans."""
-    turns = np.linspace(0.0, np.pi, 180, endpoint=False)
-    along = surface.vertices[:, :2] @ np.vstack([np.cos(turns), np.sin(turns)])
-    return float(np.ptp(along, axis=0).min())
+    return surface._width
 
 
 def triangle_areas(points: Reals, triangles: Indices) -> Reals:
