@@ -57,7 +57,7 @@ class Quantity:
         if value == least or low <= value <= high:
             return value
         raise InputError(
-            f"must be between {low:g} and {high:g} {self.unit}, as {self.of}",
+            f"must be between {typed(low)} and {typed(high)} {self.unit}, as {self.of}",
             where=where,
             value=value,
             remedy=f"Give {self.give}.{self.hint(value)}",
@@ -76,12 +76,18 @@ def if_other_unit(value: float, units: Mapping[str, float], low: float, high: fl
     """What to write of a value that is meant to lie between `low` and `high` and that does so in one of the
     `units` (each by its name, so much in the SI unit): of 50, in mm, 0.05."""
     found = {unit: value * each for unit, each in units.items() if low <= value * each <= high}
-    told = [f" For {value:g} {unit} write {meant:.6g}." for unit, meant in found.items()]
+    told = [f" For {typed(value)} {unit} write {typed(meant)}." for unit, meant in found.items()]
     unit, each = next(iter(units.items()))
     for meant in (_TWICE * value, value / _TWICE):
         if not told and low <= meant <= high:
-            told = [f" For {meant / each:g} {unit} write {meant:.6g}."]
+            told = [f" For {typed(meant / each)} {unit} write {typed(meant)}."]
     return "".join(told)
+
+
+def typed(value: float) -> str:
+    """A number as people type it into a case file: 2.55e8."""
+    mantissa, e, power = f"{value:.6g}".partition("e")
+    return f"{mantissa}e{int(power)}" if e else mantissa
 
 
 def number(value: float, digits: int = 3) -> str:

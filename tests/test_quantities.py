@@ -20,13 +20,13 @@ def written(told):
 def test_a_number_is_told_in_the_units_in_which_it_is_likely():
     assert if_other_unit(50.0, LENGTHS, 0.002, 0.3) == " For 50 mm write 0.05."
     assert if_other_unit(5.0, LENGTHS, 0.002, 0.3) == " For 5 mm write 0.005. For 5 cm write 0.05."
-    assert if_other_unit(255.0, STRESSES, 1e6, 1e10) == " For 255 MPa write 2.55e+08."
+    assert if_other_unit(255.0, STRESSES, 1e6, 1e10) == " For 255 MPa write 2.55e8."
     assert if_other_unit(1e9, LENGTHS, 0.002, 0.3) == ""
 
 
 def test_a_number_that_was_converted_once_too_often_is_told_as_what_it_was():
     assert if_other_unit(5e-5, LENGTHS, 0.002, 0.3) == " For 50 mm write 0.05."
-    assert if_other_unit(255e9, STRESSES, 1e6, 1e10) == " For 255 MPa write 2.55e+08."
+    assert if_other_unit(255e9, STRESSES, 1e6, 1e10) == " For 255 MPa write 2.55e8."
     assert if_other_unit(5e-9, LENGTHS, 0.002, 0.3) == ""
 
 
