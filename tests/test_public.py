@@ -13,22 +13,12 @@ import pytest
 
 import shellform as sf
 from shellform import lazy
+from tests.test_layers import DOORS
 from tests.test_readme import EXAMPLE
 
 ROOT = Path(__file__).parent.parent
 NAMES = sorted(lazy.homes("shellform"))
-GIANTS = [
-    "pyvista",
-    "vtkmodules",
-    "scipy",
-    "dask",
-    "distributed",
-    "numba",
-    "matplotlib",
-    "ezdxf",
-    "IPython",
-    "trimesh",
-]
+GIANTS = sorted({*DOORS, "scipy", "IPython", "trimesh"})
 
 
 def test_every_public_name_is_what_the_stub_says():

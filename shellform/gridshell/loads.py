@@ -158,7 +158,7 @@ def area_load(net: Net, surface: Surface, weight: float, region: Region = EVERYW
     return _down(weight * carried)
 
 
-@lru_cache(maxsize=1)  # concrete, membranes and every thickness that is tried lie on one net
+@lru_cache(maxsize=1)  # every thickness that is tried lies on one net
 def _carried_everywhere(net: Net, surface: Surface) -> Reals:
     return reals("areas", tributary(net, lying(surface, EVERYWHERE)), (None,))
 

@@ -15,22 +15,15 @@ _USUALLY = 0.75  # of its area: what is curved more may be creases, which bear n
 _KEPT = 4  # surfaces: one that is rounded step by step is asked beside its last shapes
 
 
-@lru_cache(maxsize=_KEPT)
 def curvature_shown(surface: Surface) -> float:
     """The larger principal curvature, 1/m, that all but a twentieth of the surface keeps."""
-    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface.vertices, surface.triangles)
-    order = np.argsort(bent)
-    share = np.cumsum(weight[order]) / weight.sum()
-    return float(bent[order][min(int(np.searchsorted(share, _SHOWN)), len(bent) - 1)])
+    return _kept_by(surface, _SHOWN)
 
 
-@lru_cache(maxsize=_KEPT)
 def curvature_usual(surface: Surface) -> float:
     """The larger principal curvature, 1/m, that three quarters of the surface keep: how it would be curved
     without its creases."""
-    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface.vertices, surface.triangles)
-    order = np.argsort(bent)
-    return float(bent[order][np.searchsorted(np.cumsum(weight[order]), _USUALLY * weight.sum())])
+    return _kept_by(surface, _USUALLY)
 
 
 @lru_cache(maxsize=_KEPT)
@@ -38,3 +31,11 @@ def curvature_mean_square(surface: Surface) -> float:
     """The mean over the surface, 1/m², of the squares of both principal curvatures."""
     weight = vertex_areas(surface.vertices, surface.triangles)
     return float(np.average((curvature(surface) ** 2).mean(axis=1), weights=weight))
+
+
+@lru_cache(maxsize=2 * _KEPT)
+def _kept_by(surface: Surface, share: float) -> float:
+    """The larger principal curvature, 1/m, that a share of the area keeps."""
+    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface.vertices, surface.triangles)
+    order = np.argsort(bent)
+    return float(bent[order][np.searchsorted(np.cumsum(weight[order]), share * weight.sum())])
