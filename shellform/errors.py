@@ -107,7 +107,7 @@ def require_angle(value: float, *, where: str, give: str) -> None:
     require_number(value, where=where, give=give)
     if abs(value) > _WHOLE_TURN:
         raise InputError(
-            f"{value:g} rad is more than a whole turn",
+            f"{typed(value)} rad is more than a whole turn",
             where=where,
             value=value,
             remedy=f"Leave whole turns out; if degrees are meant, give {math.radians(value):.4g} rad.",
@@ -117,7 +117,7 @@ def require_angle(value: float, *, where: str, give: str) -> None:
 def if_per_cents(value: float, most: float) -> str:
     """What to write of a share or factor larger than the `most` that it may be whose hundredth would suit: of
     97 0.97."""
-    return f" For {value:g} % write {value / 100.0:g}." if 1.0 < value < 100.0 * most else ""
+    return f" For {typed(value)} % write {typed(value / 100.0)}." if 1.0 < value < 100.0 * most else ""
 
 
 def require_count(value: int, *, where: str, give: str, least: int = 1, most: float = math.inf) -> None:
@@ -141,19 +141,25 @@ def require_known(value: object, known: Iterable[str], *, where: str, what: str)
         raise InputError(what, where=where, value=value, remedy=f"Known: {', '.join(names)}.")
 
 
+def typed(value: float) -> str:
+    """A number as people type it into a case file: 2.55e8."""
+    mantissa, e, power = f"{value:.6g}".partition("e")
+    return f"{mantissa}e{int(power)}" if e else mantissa
+
+
 def _between(above: float, least: float, below: float, most: float) -> str:
     """The bounds in words."""
     if math.isfinite(least) and math.isfinite(most):
-        return f"between {least:g} and {most:g}"
+        return f"between {typed(least)} and {typed(most)}"
     words = []
     if math.isfinite(above):
-        words.append("positive" if above == 0.0 else f"above {above:g}")
+        words.append("positive" if above == 0.0 else f"above {typed(above)}")
     if math.isfinite(least):
-        words.append("0 or more" if least == 0.0 else f"at least {least:g}")
+        words.append("0 or more" if least == 0.0 else f"at least {typed(least)}")
     if math.isfinite(below):
-        words.append(f"below {below:g}")
+        words.append(f"below {typed(below)}")
     if math.isfinite(most):
-        words.append(f"at most {most:g}")
+        words.append(f"at most {typed(most)}")
     return " and ".join(words if math.isfinite(min(below, most)) else [*words, "finite"])
 
 

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from shellform.errors import InputError, require_number
+from shellform.errors import InputError, require_number, typed
 
 MILLIMETRES: Final = {"mm": 1e-3}
 LENGTHS: Final = {"mm": 1e-3, "cm": 1e-2}
@@ -82,12 +82,6 @@ def if_other_unit(value: float, units: Mapping[str, float], low: float, high: fl
         if not told and low <= meant <= high:
             told = [f" For {typed(meant / each)} {unit} write {typed(meant)}."]
     return "".join(told)
-
-
-def typed(value: float) -> str:
-    """A number as people type it into a case file: 2.55e8."""
-    mantissa, e, power = f"{value:.6g}".partition("e")
-    return f"{mantissa}e{int(power)}" if e else mantissa
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -244,6 +238,21 @@ ADJUSTMENT: Final = Quantity(
     (1e-5, 2.0),
     (1e-3, 0.5),
     LENGTHS,
+)
+NODE_FORCE: Final = Quantity(
+    "every load on a crossing is", "N", "newtons a crossing, such as 6.9", (1e-6, 1e8), (0.01, 1e6), FORCES
+)
+# Wider than what rods of possible sizes and moduli come to.
+AXIAL: Final = Quantity(
+    "every EA of cables and joints is", "N", "EA in newtons, such as 7e4", (1e-6, 1e14), (10.0, 1e10), FORCES
+)
+FLEXURAL: Final = Quantity(
+    "every GJ and EI of joints is",
+    "N·m²",
+    "GJ and EI in N·m², such as 7.5e-4",
+    (1e-15, 1e14),
+    (1e-6, 1e8),
+    {"kN·m²": 1e3},
 )
 PLACE_DEVIATION: Final = Quantity(
     "every standard deviation of a place or a length is",

@@ -20,11 +20,16 @@ from pydantic import (
 from shellform.case.sized import (
     Adjustment,
     AreaMass,
+    Axial,
     ConcreteDensity,
+    Count,
+    CountOrNone,
     Density,
+    Flexural,
     Gap,
     JointMass,
     Kerf,
+    NodeForce,
     RodSize,
     Shear,
     Spacing,
@@ -86,7 +91,7 @@ class NetEntry(Entry):
     offset: tuple[float, float] = Field(
         (0.0, 0.0), description="of the net's origin from the middle, in spacings"
     )
-    elements: PositiveInt = Field(4, description="beam elements a segment")
+    elements: PositiveInt = Field(4, le=100, description="beam elements a segment")
     guides: list[list[tuple[float, float]]] | None = Field(
         None, description="two plan curves in place of angle and offset, m"
     )
@@ -173,16 +178,16 @@ class JointEntry(Entry):
     paper, scaled; the gap is their depth.
     """
 
-    axial: PositiveFloat = Field(description="EA, N")
-    torsion: PositiveFloat = Field(description="GJ, N·m²")
-    bending: PositiveFloat = Field(description="EI, N·m²")
+    axial: Axial = Field(description="EA, N")
+    torsion: Flexural = Field(description="GJ, N·m²")
+    bending: Flexural = Field(description="EI, N·m²")
     gap: Gap = Field(description="between the rods' axes, m")
 
 
 class CableEntry(Entry):
     """Bracing cables."""
 
-    stiffness: PositiveFloat = Field(description="EA, N")
+    stiffness: Axial = Field(description="EA, N")
     rest_ratio: float = Field(
         0.99, gt=0.0, lt=1.0, description="initial rest length over length in the target"
     )
@@ -209,7 +214,7 @@ class CableEntry(Entry):
 class LoadEntry(Entry):
     """Wet concrete as point loads."""
 
-    force: PositiveFloat = Field(description="on each loaded crossing, N")
+    force: NodeForce = Field(description="on each loaded crossing, N")
     every: PositiveInt = Field(1, description="2: every second crossing of the checkerboard")
     additional: float = Field(1.2, ge=1.0, lt=100.0, description="factor of the additional load case")
     openings: list[_Polygon] = Field([], description="plan polygons without load, m")
@@ -229,7 +234,7 @@ class PointsEntry(Entry):
     """Point loads on crossings."""
 
     kind: Literal["points"]
-    force: PositiveFloat = Field(description="on each loaded crossing, N")
+    force: NodeForce = Field(description="on each loaded crossing, N")
     every: PositiveInt = Field(1, description="2: every second crossing of the checkerboard")
     openings: list[_Polygon] = Field([], description="plan polygons without load, m")
     inside: list[_Polygon] = Field([], description="plan polygons with load, m; left out: everywhere")
@@ -307,7 +312,7 @@ class OptimiseEntry(Entry):
     misfit_rms_additional: PositiveFloat = Field(
         description="constraint (6) as root mean square distance a node, m; as much as the surface's larger side limits nothing"
     )
-    evaluations: PositiveInt = Field(
+    evaluations: Count = Field(
         100,
         description="design evaluations at the most, and up to a fifth more where the result falls as built",
     )
@@ -320,11 +325,11 @@ class OptimiseEntry(Entry):
     catalogue: str | None = Field(
         None, description="to which a free radius is rounded up; left out: the rods' own, if they have one"
     )
-    rounded: int = Field(
-        30, ge=0, description="design evaluations for each section that is tried in rounding; 0: no rounding"
+    rounded: CountOrNone = Field(
+        30, description="design evaluations for each section that is tried in rounding; 0: no rounding"
     )
-    neighbours: int = Field(
-        1, ge=0, description="sections below and above the rounded one that are tried too"
+    neighbours: CountOrNone = Field(
+        1, description="sections below and above the rounded one that are tried too"
     )
     cables_max: PositiveInt | None = Field(
         None, description="cables are taken away down to this number, if limits allow"
@@ -337,8 +342,8 @@ class OptimiseEntry(Entry):
     symmetric: bool = Field(
         False, description="cables that a symmetry of the net joins are polished to one length"
     )
-    polish: int = Field(
-        20, ge=0, description="design evaluations for the design polished, without the cables' share; 0: none"
+    polish: CountOrNone = Field(
+        20, description="design evaluations for the design polished, without the cables' share; 0: none"
     )
 
     unloaded: bool = Field(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, field_validator
 
 from shellform.case.entries import Entry
+from shellform.case.sized import CountOrNone
 from shellform.problem.engineering import BROKEN, ConnectorTurn
 
 
@@ -51,12 +52,13 @@ class RobustEntry(Entry):
 
     deviations: NonNegativeFloat = Field(
         1.0,
+        le=100.0,
         description="standard deviations that are added to the mean misfit where it is limited",
     )
     limit: PositiveFloat | None = Field(
         None, description="of that misfit under the design load, as root mean square distance a node, m"
     )
-    samples: NonNegativeInt = Field(
+    samples: CountOrNone = Field(
         0, description="drawn structures solved anew to check mean and deviation; 0: none"
     )
     seed: NonNegativeInt = Field(0, description="of the drawing")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Field, NonNegativeInt, PositiveInt, model_validator
+from pydantic import Field, NonNegativeInt, model_validator
 
 from shellform.case.entries import Entry
-from shellform.case.sized import PlaceDeviation
+from shellform.case.sized import Count, CountOrNone, PlaceDeviation
 from shellform.gridshell.tolerances import LARGEST_SHARE, SOURCES
 
 _Share = Annotated[float, Field(ge=0.0, le=LARGEST_SHARE)]
@@ -66,12 +66,12 @@ class SafetyEntry(Entry):
     critical_further: dict[str, Annotated[float, Field(gt=1.0, lt=100.0)]] = Field(
         {}, description="the same of further load cases, by name: { half = 1.2 }"
     )
-    drawn: PositiveInt = Field(200, description="structures of the design to build")
-    compared: PositiveInt = Field(
+    drawn: Count = Field(200, description="structures of the design to build")
+    compared: Count = Field(
         20,
         description="structures of the designs to compare with; of the initial one all where no fewer than of it are to stand",
     )
-    rare: NonNegativeInt = Field(
+    rare: CountOrNone = Field(
         0,
         multiple_of=10,
         description="structures a level of the subset simulation that tells how rarely the design to build falls: "

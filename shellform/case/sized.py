@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat
+from pydantic import AfterValidator, Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shellform import quantities
-from shellform.errors import InputError
-from shellform.quantities import FORCES, if_other_unit
+from shellform.errors import InputError, typed
+from shellform.quantities import FORCES, if_other_unit, newtons, number
 
 Spacing = Annotated[PositiveFloat, AfterValidator(quantities.SPACING.require)]
 Gap = Annotated[PositiveFloat, AfterValidator(quantities.GAP.require)]
@@ -25,7 +25,14 @@ Thickness = Annotated[PositiveFloat, AfterValidator(quantities.THICKNESS.require
 ConcreteDensity = Annotated[PositiveFloat, AfterValidator(quantities.CONCRETE_DENSITY.require)]
 AreaMass = Annotated[PositiveFloat, AfterValidator(quantities.AREA_MASS.require)]
 JointMass = Annotated[PositiveFloat, AfterValidator(quantities.JOINT_MASS.require)]
+NodeForce = Annotated[PositiveFloat, AfterValidator(quantities.NODE_FORCE.require)]
+Axial = Annotated[PositiveFloat, AfterValidator(quantities.AXIAL.require)]
+Flexural = Annotated[PositiveFloat, AfterValidator(quantities.FLEXURAL.require)]
 PlaceDeviation = Annotated[NonNegativeFloat, AfterValidator(quantities.PLACE_DEVIATION.or_none)]
+
+_MOST = 1_000_000  # drawn structures and design evaluations: a day's work of a large machine, and years' of a small one
+Count = Annotated[PositiveInt, Field(le=_MOST)]
+CountOrNone = Annotated[NonNegativeInt, Field(le=_MOST)]
 
 STRETCHED = 5.0  # strain of rubber where it breaks
 _UNSTRETCHED = 1e-5  # strain to which no cable is set: a thousandth of steel's where it breaks
@@ -38,14 +45,14 @@ def refuse_strain(stiffness: float, force_max: float) -> None:
     meant = if_other_unit(stiffness, FORCES, force_max, 1e4 * force_max)
     if strain > STRETCHED and meant:
         raise InputError(
-            f"lets cables pull {force_max:g} N, at which they would be {1.0 + strain:.3g} times as long",
+            f"lets cables pull {newtons(force_max)}, at which they would be {number(1.0 + strain)} times as long",
             where="cable.stiffness",
             value=stiffness,
-            remedy=f"Give EA and cable.force_max both in newtons, or cable.force_max = {stiffness:g} for no limit.{meant}",
+            remedy=f"Give EA and cable.force_max both in newtons, or cable.force_max = {typed(stiffness)} for no limit.{meant}",
         )
     if strain < _UNSTRETCHED:
         raise InputError(
-            f"is what cables of {stiffness:g} N bear at a strain of {strain:.2g}, to which none can be set",
+            f"is what cables of {newtons(stiffness)} bear at a strain of {number(strain, 2)}, to which none can be set",
             where="cable.force_max",
             value=force_max,
             remedy="Give cable.stiffness, EA, and the force both in newtons."

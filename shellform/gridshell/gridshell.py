@@ -25,7 +25,7 @@ from shellform.gridshell.loads import points
 from shellform.gridshell.possible_rods import refuse_thick, require_section
 from shellform.net.grid import ROD, grid_beams
 from shellform.net.net import Net
-from shellform.quantities import GAP, ROD_SIZE
+from shellform.quantities import AXIAL, FLEXURAL, GAP, ROD_SIZE
 from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.sections import (
@@ -109,12 +109,7 @@ class Rod:
         return Rod(self.section.with_sizes([size / self.radius * radius for size in self.section.sizes]))
 
 
-_JOINT_UNITS = {
-    "axial": "EA in newtons, such as 7.15e4",
-    "torsion": "GJ in N·m², such as 7.38e-4",
-    "bending": "EI in N·m², such as 7.85e-4",
-    "gap": GAP.give,
-}
+_OF_JOINTS = {"axial": AXIAL, "torsion": FLEXURAL, "bending": FLEXURAL, "gap": GAP}
 
 
 @dataclass(frozen=True)
@@ -129,9 +124,8 @@ class Joint:
     gap: float
 
     def __post_init__(self) -> None:
-        for name, unit in _JOINT_UNITS.items():
-            require_number(getattr(self, name), above=0.0, where=f"joint.{name}", give=unit)
-        GAP.require(self.gap, where="joint.gap")
+        for name, quantity in _OF_JOINTS.items():
+            quantity.require(getattr(self, name), where=f"joint.{name}")
 
     @property
     def stiffness(self) -> BeamStiffness:
@@ -146,9 +140,7 @@ class Cable:
     stiffness: float
 
     def __post_init__(self) -> None:
-        require_number(
-            self.stiffness, above=0.0, where="cable.stiffness", give="EA in newtons, such as 187.0"
-        )
+        AXIAL.require(self.stiffness, where="cable.stiffness")
 
 
 @dataclass(frozen=True, eq=False)

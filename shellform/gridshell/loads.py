@@ -28,6 +28,7 @@ from shellform.quantities import (
     CONCRETE_DENSITY,
     JOINT_MASS,
     LENGTHS,
+    NODE_FORCE,
     THICKNESS,
     coordinates,
     if_other_unit,
@@ -213,7 +214,8 @@ def points(
     of `inside`."""
     loaded = crossings_to_load(net, every, openings, inside)
     weight = np.zeros(net.node_count)
-    require_number(force, where="load.force", give="newtons a crossing, such as 6.9")
+    most = NODE_FORCE.possible[1]
+    require_number(force, least=-most, most=most, where="load.force", give=NODE_FORCE.give)
     weight[net.grid.crossing_nodes[loaded, 1]] = force
     return _down(weight)
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Reals, reals
-from shellform.errors import InputError, require_angle, require_count, require_number
+from shellform.errors import InputError, require_angle, require_count, require_number, typed
 from shellform.net.compass import Finder, covering_lattice
 from shellform.net.grid import Grid, lattice_grid
 from shellform.net.lattice_origin import origin_at, origin_of_guides
@@ -50,6 +50,7 @@ MERGE = 0.2  # of the spacing
 ELEMENTS = 4  # a segment, as in section 4.1
 # Spacings past the edge; the next is tried where the pulled grid left the surface's rim bare
 _MARGINS = (1.5, 2.5, 4.0, 6.5, 10.0)
+_STIFFEST = 1e6  # of springs, EI/s³, and against shear, EI/s; and one over the softest: beyond it rods are lost in rounding
 _BEYOND = 1.5  # spacings that the surface goes on past the margin
 
 
@@ -258,7 +259,13 @@ def _check(surface: Surface, settings: NetSettings) -> None:
     give = "a share of the spacing, such as 0.2"
     require_number(settings.merge, above=0.0, below=0.5, where="net.merge", give=give, share=True)
     give = f"EI/s a radian, such as {SHEAR_STIFFNESS:g}"
-    require_number(settings.shear_stiffness, above=0.0, where="net.shear_stiffness", give=give)
+    require_number(
+        settings.shear_stiffness,
+        least=1.0 / _STIFFEST,
+        most=_STIFFEST,
+        where="net.shear_stiffness",
+        give=give,
+    )
     if settings.ground is not None:
         require_number(settings.ground, where="net.ground", give="a level in metres, or leave it out")
 
@@ -289,9 +296,13 @@ def _short(bare: int, angle: float) -> NoNet:
 def _densities(given: Sequence[float] | None, start: Start) -> Sequence[float]:
     if given is None:
         return FROM_COMPASS if start == "compass" else FROM_FLAT
-    if not given or any(not 0.0 < each < np.inf for each in given) or list(given) != sorted(given):
+    if (
+        not given
+        or any(not 1.0 / _STIFFEST <= each <= _STIFFEST for each in given)
+        or list(given) != sorted(given)
+    ):
         raise InputError(
-            "must be positive and rising",
+            f"must be positive and rising, from {typed(1.0 / _STIFFEST)} to {typed(_STIFFEST)}",
             where="net.spring_density",
             value=list(given),
             remedy="For example [0.05, 0.5, 5.0].",

@@ -106,6 +106,26 @@ def test_edge_beams_and_weights_on_an_area_are_refused_alike():
 
 
 @pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("load.force=1e40", "load.force: must be between 1e-6 and 1e8 N"),
+        ("joint.axial=1e30", "joint.axial: must be between 1e-6 and 1e14 N,"),
+        ("joint.torsion=1e-30", "joint.torsion: must be between 1e-15 and 1e14 N·m²"),
+        ("joint.bending=1e30", "joint.bending: must be between 1e-15 and 1e14 N·m²"),
+        ("cable.stiffness=1e30", "cable.stiffness: must be between"),
+        ("net.elements=10000000000", "net.elements: input should be less than or equal to 100 "),
+        ("safety.drawn=10000000000", "safety.drawn: input should be less than or equal to 1000000"),
+        ("safety.rare=10000000000", "safety.rare: input"),
+        ("optimise.evaluations=10000000000", "optimise.evaluations: input"),
+        ("robust.samples=10000000000", "robust.samples: input"),
+        ("cable.force_max=0.001", "is what cables of 187 N bear at a strain of 5.3 × 10⁻⁶, to which none can be set"),
+    ],
+)  # fmt: skip
+def test_what_no_shell_can_have_is_refused_at_the_door(setting, said):
+    assert said in told(VAULT, setting)
+
+
+@pytest.mark.parametrize(
     ("case", "settings"),
     [
         (HALL, ["net.spacing=2.5", "rod.radius=0.06", "joint.gap=0.12"]),  # a hall of 100 m
