@@ -2,8 +2,8 @@
 
 The limit state of a structure is the load factor at which it loses its stable branch, less the factor 1 of
 the load that it has to bear. Factors are sought up to `SOUGHT`, found to `RESOLUTION`, and beyond that taken
-as equal: where the better part of all structures bears more, the first level's bound lies among those that
-don't, and where all do, nothing fails.
+as equal: where more than nine tenths of all structures bear more, the first level goes on from those that
+don't, however few, and where all do, nothing fails.
 
 The factors come in an order that the seed decides alone: what was found before it was broken off is gone
 through again with the factors that are `known`.

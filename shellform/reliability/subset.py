@@ -6,12 +6,15 @@ With independent standard normal variables z and a limit state g(z), below zero 
     P(g < 0) = P(g < b_1) P(g < b_2 | g < b_1) ... P(g < 0 | g < b_m),
 
 each b_i the quantile of share p_0 of the samples of the level before, so that every factor is about p_0 and a
-probability of 1e-3 takes three levels. Samples of a level come from Markov chains that start in those of the
-level before below its b: a step draws z' = a z + sqrt(1 - a²) e with fresh normal e, which keeps the normal
-distribution, and is taken if g(z') < b (conditional sampling; Papaioannou, Betz, Zwirglmaier and Straub 2015,
-Probabilistic Engineering Mechanics 41, 89, whose rule for the step towards a rate of acceptance of 0.44 is
-used). The coefficient of variation is the first-order one of Au and Beck with independent levels,
-correlations along the chains taken in (their equation 29).
+probability of 1e-3 takes three levels. Where samples tie at b, as limit states do that are found to a
+resolution and up to a largest value, the factor is the share of those below or at it; where b is the largest
+value, of those below. Samples of a level come from Markov chains that start in those of the level before
+below its b, drawn by lot where there are more than chains, in turns where there are fewer: a step draws z' =
+a z + sqrt(1 - a²) e with fresh normal e, which keeps the normal distribution, and is taken if g(z') < b
+(conditional sampling; Papaioannou, Betz, Zwirglmaier and Straub 2015, Probabilistic Engineering Mechanics 41,
+89, whose rule for the step towards a rate of acceptance of 0.44 is used). The coefficient of variation is the
+first-order one of Au and Beck with independent levels, correlations along the chains taken in (their equation
+29).
 """
 
 from __future__ import annotations
@@ -42,6 +45,7 @@ class Rare(Record):
     - `probability` of failure, with its coefficient of `variation`.
     - `evaluations` of the limit state.
     - `levels`: values of the limit state passed on the way.
+    - `reached`: the share of all points that lie beyond the last of them.
     - `failed` (k, d): the failed points of the last level, the likeliest (of smallest norm) first.
     """
 
@@ -49,12 +53,8 @@ class Rare(Record):
     variation: float
     evaluations: int
     levels: tuple[float, ...]
+    reached: float
     failed: Reals
-
-    @property
-    def reached(self) -> float:
-        """The share of all points that lie beyond the last level passed."""
-        return float(_SHARE ** len(self.levels))
 
 
 def subset_simulation(limit_state: LimitState, size: int, *, count: int, seed: int) -> Rare:
@@ -83,10 +83,14 @@ def subset_simulation(limit_state: LimitState, size: int, *, count: int, seed: i
             break
         if g.min() == g.max():  # nothing that leads towards a failure
             break
-        probability *= _SHARE
-        squares += _square(g <= bound, chains, _SHARE)
+        if bound >= g.max():  # next to nothing lies below what is told as equal
+            bound = float(np.nextafter(g.max(), -np.inf))
+        inside = order[: np.searchsorted(g[order], bound, side="right")]
+        probability *= len(inside) / count
+        squares += _square(g <= bound, chains, len(inside) / count)
         passed.append(bound)
-        z, g, step, more = _level(limit_state, z[order[:seeds]], g[order[:seeds]], bound, length, step, rng)
+        begin = inside if len(inside) == seeds else np.resize(rng.permutation(inside), seeds)
+        z, g, step, more = _level(limit_state, z[begin], g[begin], bound, length, step, rng)
         chains = np.arange(count).reshape(length, seeds).T
         spent += more
     failing = g < 0.0
@@ -96,7 +100,7 @@ def subset_simulation(limit_state: LimitState, size: int, *, count: int, seed: i
     failed = z[failing]
     nearest = np.argsort((failed**2).sum(axis=1), kind="stable")
     variation = math.sqrt(squares) if share > 0.0 else math.inf
-    return Rare(probability * share, variation, spent, tuple(passed), failed[nearest])
+    return Rare(probability * share, variation, spent, tuple(passed), probability, failed[nearest])
 
 
 def _level(

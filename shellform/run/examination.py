@@ -49,7 +49,7 @@ from shellform.run.folder import Run, read_run
 from shellform.run.judged import asked_as_built, judged, run_checks
 from shellform.run.pace import time_words
 from shellform.run.rare_failures import rare_of
-from shellform.run.sampling import Clock, Examined, drawn_of
+from shellform.run.sampling import SHAPES, Clock, Examined, drawn_of
 from shellform.run.thicker import rods_that_stand
 from shellform.run.workspace import Workspace
 from shellform.structure.elements.threads import side_by_side
@@ -158,20 +158,20 @@ def _with_ends(
 ) -> dict[str, LoadRecord]:
     """The loads' records with what the path of the one that is `followed` tells of each; their `shares` of
     the largest are given."""
-    sought = max(SOUGHT, _BEYOND * max((asked.get(name, 0.0) for name in shares), default=0.0))
+    times = {name: share / shares[followed] for name, share in shares.items()}
+    sought = max(SOUGHT, *(_BEYOND * asked.get(name, 0.0) * larger for name, larger in times.items()))
     try:
         error = mesh_error(each.shell, each.design, each.loads[followed], sought=sought)
     except NotConverged as lost:
         return {name: replace(rows[name], critical_kind=f"not found: {lost.what}") for name in shares}
     ended = {}
-    for name, share in shares.items():
-        times = shares[followed] / share
+    for name, larger in times.items():
         ended[name] = replace(
             rows[name],
-            critical_sought=sought * times,
-            critical_factor=error.critical.coarse * times,
-            critical_factor_halved=error.critical.fine * times,
-            critical_factor_error=error.critical.error * times,
+            critical_sought=sought / larger,
+            critical_factor=error.critical.coarse / larger,
+            critical_factor_halved=error.critical.fine / larger,
+            critical_factor_error=error.critical.error / larger,
             critical_kind=error.kinds[0],
         )
     strength = each.shell.rod.strength
@@ -201,7 +201,7 @@ def _stand(workspace: Workspace, each: Examined, count: int, summary: Summary, c
         guided = _guided(each, largest, shares, entry.seed) if first else {}
         for name, share in shares.items():
             own = replace(rows[name], stands=_standing(path, share, workspace.case))
-            if name == "design" and first:
+            if name == "design" and (before is None or before.drawn < SHAPES):
                 own = replace(own, built_shape=_built_shape(path, each, entry.seed))
             rows[name] = replace(own, expected_stiffness=guided.get(name, own.expected_stiffness))
     record = replace(summary.designs[each.name], loads=rows)
@@ -271,7 +271,7 @@ def _standing(path: DrawnPath, share: float, case: Case) -> StandingRecord:
         entry.seed,
         min(fallen.values(), default=share) / share,
         len(snaps),
-        max((own.far for own in path.snaps if own.number in snaps), default=0.0),
+        max((own.far for own in path.snaps if own.number in snaps and own.factor < share), default=0.0),
     )
 
 
@@ -322,6 +322,8 @@ def _failure(workspace: Workspace, each: Examined, count: int) -> FailureRecord 
     """How a design most likely fails, under the smallest load under which one of its structures falls by
     itself; None where none does."""
     workspace.path(FAILURE).unlink(missing_ok=True)
+    if not each.tolerances.causes:  # the perfect structure falls, of which its critical factor tells
+        return None
     clock = Clock(0)
     for load in sorted(each.loads, key=lambda name: float(np.linalg.norm(each.loads[name]))):
         route = next((largest for largest, shares in paths(each.loads).items() if load in shares), None)

@@ -101,7 +101,10 @@ def test_a_surface_with_a_spike_is_refused(vault):
         ({"spacing": 0.055, "gap": 0.002, "merge": 0.9}, "below 0.5.*share of the spacing"),
         ({"spacing": 0.055, "gap": 0.002, "angle": float("nan")}, "must be numbers"),
         ({"spacing": 0.055, "gap": 0.002, "angle": 45.0}, "if degrees are meant, give 0.7854 rad"),
-        ({"spacing": 0.055, "gap": 0.002, "shear_stiffness": -0.1}, "net.shear_stiffness: must be between 1e-6 and 1e6"),
+        (
+            {"spacing": 0.055, "gap": 0.002, "shear_stiffness": -0.1},
+            "net.shear_stiffness: must be between 1e-6 and 1e6",
+        ),
         ({"spacing": 0.055, "gap": 0.002, "ground": float("nan")}, "net.ground: must be finite"),
         ({"spacing": 0.055, "gap": 0.002, "offset": (float("inf"), 0.0)}, "must be numbers"),
     ],
