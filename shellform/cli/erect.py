@@ -17,7 +17,7 @@ def erect(
         str | None,
         typer.Option(
             help="supports (that move in) or scaffold (that rises under the crossings); left out: scaffold where "
-            "there are edge beams, else supports."
+            "there are edge beams or rods in two layers, else supports."
         ),
     ] = None,
     props: Annotated[

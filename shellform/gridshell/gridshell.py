@@ -9,6 +9,7 @@ the axis, is at most the flexural strength (equation 1).
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -213,6 +214,14 @@ class Gridshell(Record):
     def node_count(self) -> int:
         """How many nodes there are, those of both layers of rods."""
         return self.net.node_count
+
+    def locked_in(self, state: State) -> Gridshell:
+        """The same with its rods, if they have two layers, locked without stress in a `state` instead of on
+        the target."""
+        other = copy.copy(self)
+        object.__setattr__(other, "_locks", locks(self.net, self.rod.section, state))
+        object.__setattr__(other, "_made", {})
+        return other
 
     def design(self, *, rest_ratio: float = 0.99) -> Design:
         """The initial design: every candidate cable at `rest_ratio` of its length in the target."""

@@ -24,7 +24,7 @@ from shellform.errors import (
     require_known,
 )
 from shellform.gridshell.gridshell import Gridshell
-from shellform.quantities import PLACE_DEVIATION, TURN, newtons
+from shellform.quantities import PLACE_DEVIATION, TURN, newtons, number
 from shellform.run.folder import Run, read_run
 from shellform.run.site_sources import design_named, load_named, scan_under, scanned
 from shellform.site import calibration, erection, measurements, retensioning
@@ -274,10 +274,22 @@ def erect(
             f"largest cable tension {newtons(max(each.tension for each in done.steps))}, largest force on a "
             f"support {newtons(max(each.reaction for each in done.steps))}",
             *([] if borne is None else [_scaffold(borne)]),
+            *([] if weight else _beside_design(run, name, load or "none", last.state)),
             *([_broken(worst.stage, borne, tighten_first)] if worst.stress > done.strength else []),
         ],
         files,
     )
+
+
+def _beside_design(run: Run, design: str, load: str, state: State) -> list[str]:
+    """How far a shell that was erected ends from where its design lies; nothing of a load that the run
+    doesn't have."""
+    known = run.states[design].get(load)
+    if known is None:
+        return []
+    far = float(np.linalg.norm(state.positions - known.positions, axis=1).max())
+    under = "before any load" if load == "none" else f"under the load “{load}”"
+    return [f"in the end it lies up to {number(1e3 * far, 2)} mm from where the design does {under}"]
 
 
 def _broken(stage: str, borne: Props | None, tighten_first: bool) -> str:

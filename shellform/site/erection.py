@@ -12,7 +12,10 @@ supports moving back (loading.py), and the steps are put in reverse. A `lift` (a
 before the supports move until they have arrived. Stresses are those of equation σ = |N|/A + |M| r/I at both
 ends of every rod element.
 
-Rods in two layers slide until the cables are tight; then they are locked as they lie, and the load follows.
+Rods in two layers slide until they are locked as they lie: on the scaffold, next to the target, before it
+goes and before cables are tight, which is how designs take them to be locked; where supports move in, once
+the cables are tight, since nothing else holds the grid near its shape: that is another shell than was
+designed. The load follows.
 """
 
 from __future__ import annotations
@@ -26,13 +29,10 @@ from numpy.typing import ArrayLike
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError, NotConverged, require_known, require_number
 from shellform.gridshell.gridshell import Design, Gridshell, Rod
-from shellform.gridshell.layers import TwoLayers, locks
+from shellform.gridshell.layers import TwoLayers
 from shellform.site.erection_steps import SMALLEST, Erection, ErectionStep, Site, laid_out
 from shellform.site.scaffold import Scaffold
-from shellform.structure.elements.beam import joined
 from shellform.structure.elements.state import State
-from shellform.structure.network import assemble
-from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import Equilibrium, find_equilibrium
 from shellform.structure.solve.loading import advance
@@ -61,7 +61,7 @@ def erect(
     """The erection of the shell with the design's cables.
 
     - `by`: what brings the grid up, "supports" that move in or a "scaffold" (scaffold.py); None: a scaffold
-      where there are edge beams, else supports.
+      where there are edge beams or rods in two layers, else supports.
     - Of a scaffold, `props`: nodes of the crossings that it bears (None: every second one);
       `tighten_first`: the cables are tightened before it goes.
     - Of supports, `way`: their positions (s, 3), m, between the flat grid and the target, in the order of
@@ -89,13 +89,15 @@ def erect(
     unbraced = replace(design, present=np.zeros(len(design.present), dtype=bool))
     now = replace(design, rest_length=np.maximum(_SLACK * shell.cable_lengths, design.rest_length))
     scaffold = Scaffold(shell, unbraced, own, props, step) if by == SCAFFOLD else None
-    free = Site(shell, now) if scaffold is None else scaffold.standing(now)
     if scaffold is None:
-        site = Site(shell, unbraced)
+        site, free = Site(shell, unbraced), Site(shell, now)
         state, braced = _erected(site, own), free
         steps = _taken_down(site, state, way, carried, own, step)
     else:
-        steps, braced = scaffold.up(), scaffold.site(now) if tighten_first else free
+        steps = scaffold.up()
+        scaffold.shell = locked.locked_in(steps[-1].state)
+        free = scaffold.standing(now)
+        braced = scaffold.site(now) if tighten_first else free
         if not tighten_first:
             steps += scaffold.taken_away(unbraced, steps[-1].state, braced_later=len(teams) > 0)
         state = steps[-1].state
@@ -107,19 +109,9 @@ def erect(
         steps += scaffold.taken_away(now, state, braced_later=False)
         state = steps[-1].state
     if last.any():
-        there = _locked(locked, free, now, state)
-        steps += _loaded(Site(locked, now, there, free.holding), state, own, last, step)
+        whole = Site(locked.locked_in(state), now) if scaffold is None else scaffold.standing(now)
+        steps += _loaded(whole, state, own, last, step)
     return Erection(tuple(steps), shell.rod.strength)
-
-
-def _locked(locked: Gridshell, free: Site, now: Design, state: State) -> Assembly:
-    """The braced shell that stands freely; its rods, if they have two layers, locked as they lie."""
-    shell = free.shell
-    blocks = locks(shell.net, locked.rod.resized(now.radius).section, state)
-    if blocks is None:
-        return free.assembly.with_parts((shell.beams(now.radius), shell.cables(now)))
-    network = shell.network(now)
-    return assemble(replace(network, beams=joined(network.beams, blocks)))
 
 
 def _loaded(site: Site, state: State, weight: Reals, load: Reals, step: float) -> list[ErectionStep]:
@@ -144,7 +136,8 @@ def _way_up(shell: Gridshell, by: str | None, *, moving: Sequence[str], propped:
     """The way that the grid goes up, where what is given goes with supports that move (`moving`) or with a
     scaffold (`propped`). Raises InputError for what doesn't go with it."""
     edges = len(shell.net.edges)
-    usual = SCAFFOLD if edges or propped else SUPPORTS
+    layers = isinstance(shell.rod.section, TwoLayers) and not moving
+    usual = SCAFFOLD if edges or propped or layers else SUPPORTS
     way = usual if by is None else by
     require_known(way, WAYS_UP, where="erect.by", what="is no way up")
     if way == SUPPORTS and edges:

@@ -302,21 +302,20 @@ def erected(monkeypatch, *, groups=None, load=None, borne=True, section=None, **
     )
     given = shell(
         rod=rod, node_count=4, cable_lengths=np.array([1.0, 2.0, 3.0]), target="target", beams=lambda radius: None,
-        cables=lambda design: None,
+        cables=lambda design: None, locked_in=lambda state: SimpleNamespace(locked_in=state),
     )  # fmt: skip
     given.net.edges = ()
 
     class Site:
         def __init__(self, _shell, design, assembly=None, holding=None):
-            self.shell, self.holding, self.design, self.assembly = (
-                _shell,
-                holding,
-                design,
-                assembly or SimpleNamespace(with_parts=lambda parts: "braced"),
-            )
+            self.shell, self.holding, self.design, self.assembly = _shell, holding, design, assembly
 
         def step(self, stage, share, state, load):
             return stage, share, state, load[2, 2]
+
+    def loaded(site, state, *rest, own=erection._loaded):
+        assert site.shell.locked_in == state, "layers are locked as they lie"
+        return own(site, state, *rest)
 
     def down(_site, _state, _way, _lift, _weight, step):
         seen.steps = step
@@ -328,7 +327,7 @@ def erected(monkeypatch, *, groups=None, load=None, borne=True, section=None, **
         return design, state + 1, []
 
     def advance(assembly, state, drive, *, step, stay, heeding, report):
-        assert (assembly, state, stay, heeding) == ("braced", len(seen.stages), True, True)
+        assert (state, stay, heeding) == (len(seen.stages), True, True)
         report(0.4, SimpleNamespace(state="loaded"))
         assert (drive.at(0.0)[2, 2], drive.at(0.4)[2, 2]) == (-2.0, -5.2)
         return SimpleNamespace(on_branch=borne, share=0.4, equilibrium=SimpleNamespace(state="loaded"))
@@ -337,7 +336,7 @@ def erected(monkeypatch, *, groups=None, load=None, borne=True, section=None, **
     monkeypatch.setattr(erection, "_taken_down", down)
     monkeypatch.setattr(erection, "_tightened", tighten)
     monkeypatch.setattr(erection, "advance", advance)
-    monkeypatch.setattr(erection, "locks", lambda *_: None)
+    monkeypatch.setattr(erection, "_loaded", loaded)
     monkeypatch.setattr(erection, "find_equilibrium", lambda *_: SimpleNamespace(state=0))
     weight = NONE.copy()
     weight[2, 2] = -2.0

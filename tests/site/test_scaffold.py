@@ -8,7 +8,9 @@ import pytest
 import shellform as sf
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.edge_beams import Bundle, EdgeBeam
+from shellform.gridshell.layers import TwoLayers
 from shellform.net.edges import stand
+from shellform.site import erection as erection_module
 from shellform.site import scaffold
 from shellform.site.erection import erect
 from shellform.site.scaffold import Scaffold
@@ -211,6 +213,35 @@ def test_a_scaffold_bears_every_second_crossing_by_its_lower_rod_where_the_targe
     kept = np.isin(lower, scaffold._propped(given, None))
     np.testing.assert_array_equal(kept[away], aside[away] < 0.43)
     assert 0 < kept.sum() < len(lower)
+
+
+def test_rods_in_two_layers_are_locked_on_the_scaffold_and_the_shell_ends_where_it_was_designed(arches):
+    """Blocks are put in where the laths lie then, next to the target, on which designs take them to be
+    without stress."""
+    laths = sf.Rod(TwoLayers(arches.rod.resized(0.0009).section, 0.5))
+    shell = replace(arches, rod=laths)
+    design = shell.design()
+    load = shell.point_load(-0.5, every=2)
+    done = erect(shell, design, load=load, step=0.5)
+    expected = find_equilibrium(assemble(shell.network(design)), shell.target, load).state
+    away = np.linalg.norm(done.steps[-1].state.positions - expected.positions, axis=1).max()
+    loose = find_equilibrium(
+        assemble(replace(shell, rod=sf.Rod(replace(laths.section, composite=0.0))).network(design)),
+        shell.target,
+        load,
+    ).state
+    assert away < 0.3 * np.linalg.norm(loose.positions - expected.positions, axis=1).max()
+    before = [step for step in done.steps if step.stage == "clamping"][-1]
+    ends = shell.locked_in(before.state).beams(design.radius)
+    locks = ends.of_kind("lock")
+    assert np.abs(ends.local_forces(before.state)[locks]).max() < 1e-9, "without stress where they are put in"
+
+
+def test_two_layers_go_up_by_a_scaffold_unless_supports_are_to_move_on_a_way(shell):
+    laths = replace(shell, rod=sf.Rod(TwoLayers(shell.rod.section, 0.5)))
+    assert erection_module._way_up(laths, None, moving=[], propped=[]) == "scaffold"
+    assert erection_module._way_up(laths, None, moving=["way"], propped=[]) == "supports"
+    assert erection_module._way_up(shell, None, moving=[], propped=[]) == "supports"
 
 
 def test_a_single_prop_brings_up_a_small_vault(arches, erection):

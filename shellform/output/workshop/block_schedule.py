@@ -53,8 +53,8 @@ def block_table(shell: Gridshell, design: Design, states: Mapping[str, State], r
     heads = ("rod", "stretch", "from [m]", "to [m]", *(f"{name}: carried [N]" for name in states))
     notes = (
         f"Laths are bent one by one, {MM * section.apart:g} mm between their axes once both lie; blocks as deep "
-        "as a lath lock them when the shell has its shape and its cables are tight, a stretch at least one, and "
-        "one at each end of a rod.",
+        "as a lath lock them while the scaffold still holds the shell in its shape, before cables are tightened, a "
+        "stretch at least one, and one at each end of a rod. Locked later the shell is another one than was designed.",
         f"They are taken to lock the laths to {section.composite:.0%} of what glue would (rod.composite): "
         "test it with the blocks and bolts that are meant.",
         "Holes for the bolts of crossings must let laths slide on one another while they are bent.",
