@@ -484,3 +484,40 @@ def test_designs_are_drawn_in_full_from_the_last_on_until_one_holds(
     monkeypatch.setattr(examination, "to_build", lambda found, every: "unbraced")
     unbraced = examination.examine(desk)
     assert (unbraced.failure, unbraced.rare, unbraced.thicker) == (None, None, None)
+
+
+def test_of_a_design_that_falls_behind_once_it_is_drawn_in_full_neither_verdict_nor_failure_is_told(
+    monkeypatch, tmp_path
+):
+    """Another one then is the one to build, and is drawn in full, too."""
+    asked = []
+    run = examination.Run(
+        tmp_path, CASE, None, None, LOADS, dict.fromkeys(("initial", "optimised", "polished")), {}, told()
+    )
+
+    def stand(desk, each, count, so_far, clock):
+        if count == 40:
+            asked.append(each.name)
+        return so_far
+
+    monkeypatch.setattr(examination, "read_run", lambda folder: run)
+    monkeypatch.setattr(examination, "_of_run", lambda run, name: examined(name))
+    monkeypatch.setattr(examination, "side_by_side", lambda call, every: [call(each) for each in every])
+    monkeypatch.setattr(examination, "_critical", lambda case, each, record: record)
+    monkeypatch.setattr(examination, "_stand", stand)
+    monkeypatch.setattr(examination, "run_checks", lambda run: "checks")
+    monkeypatch.setattr(examination, "failed", lambda found, name: True)
+    monkeypatch.setattr(
+        examination, "to_build", lambda found, every: "optimised" if "polished" in asked else "polished"
+    )
+    monkeypatch.setattr(examination, "_failure", lambda desk, each, count: (each.name, count))
+    monkeypatch.setattr(examination, "falls", lambda designs, name, safety: False)
+    monkeypatch.setattr(examination, "asked_as_built", lambda case: "asked")
+    monkeypatch.setattr(examination, "judged", lambda run: "verdict")
+    given = run.summary
+    for name in ("polished",):
+        given = given.with_design(name, given.designs["initial"])
+    run = replace(run, summary=given)
+    found = examination.examine(Desk(tmp_path, probability_additional=0.95))
+    assert asked == ["polished", "optimised"]
+    assert found.failure == ("optimised", 40)
