@@ -38,7 +38,7 @@ def standing_checks(
     rows: Mapping[str, DesignRecord],
     rods: Mapping[str, RodsOf],
     loads: Sequence[str],
-    factors: Mapping[str, float],
+    factors: Mapping[str, float | None],
     safety: AsBuilt | None,
 ) -> list[Check]:
     """How many drawn structures stand."""
@@ -61,7 +61,7 @@ def guide_checks(
     rows: Mapping[str, DesignRecord],
     names: Sequence[str],
     loads: Sequence[str],
-    factors: Mapping[str, float],
+    factors: Mapping[str, float | None],
 ) -> list[Check]:
     """The guide beside the drawn structures, and how well both agree: it judges nothing."""
     found = []

@@ -116,7 +116,8 @@ class BuiltShapeRecord:
 
 @dataclass(frozen=True)
 class LoadRecord:
-    """A design under one load case, `factor` times the design load.
+    """A design under one load case, which weighs `factor` times as much as the design load and is that load
+    so many times where it is a `multiple` of it (taken for granted of older runs, which don't say).
 
     `deviation_max`, `deviation_mean`, `deviation_rms`, m: distances between a node and its place on the
     target, over all nodes. `stable`: in a stable equilibrium; `on_branch`: reached without snapping through;
@@ -160,6 +161,12 @@ class LoadRecord:
     stands: StandingRecord | None = None
     built_shape: BuiltShapeRecord | None = None
     expected_stiffness: float | None = None
+    multiple: bool = True
+
+    @property
+    def times(self) -> float | None:
+        """How many times the design load this one is; None where it is no multiple of it."""
+        return self.factor if self.multiple else None
 
     def unexamined(self) -> LoadRecord:
         """Without what the stage "safety" finds."""

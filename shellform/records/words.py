@@ -55,7 +55,8 @@ def cause_title(name: str) -> str:
 
 
 def load_title(name: str, factor: float | None = None) -> str:
-    """A load case in words."""
+    """A load case in words; `factor`: how many times the design load it is, None where it isn't known or no
+    multiple of it."""
     words = LOADS.get(name, f"“{name}”")
     return f"{factor:.3g} × the load" if name == "additional" and factor is not None else words
 

@@ -17,6 +17,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import CONNECTOR
 from shellform.problem.paths import deviations, follow
 from shellform.records.summary import DesignRecord, LoadRecord, Summary, write_summary
+from shellform.reliability.safety import paths
 from shellform.run.design_files import design_file, write_design_file
 from shellform.run.figures import write_states
 from shellform.run.workspace import Workspace
@@ -115,14 +116,30 @@ def write_design(
         cable_force_sum=float(pull.sum()),
         cable_force_max=float(pull.max(initial=0.0)),
         loads={
-            each: load_record(shell, design, loaded[each], load, float(load[:, 2].sum() / weight))
+            each: load_record(
+                shell,
+                design,
+                loaded[each],
+                load,
+                float(load[:, 2].sum() / weight),
+                multiple=_is_multiple(load, loads["design"]),
+            )
             for each, load in loads.items()
         },
     )
 
 
-def load_record(shell: Gridshell, design: Design, loaded: Loaded, load: Reals, factor: float) -> LoadRecord:
-    """The record of a design under a `load` (n, 6), which is so many times the design load."""
+def _is_multiple(load: Reals, design_load: Reals) -> bool:
+    """Whether a load (n, 6) is so many times the design load, or nothing of it: one of other shares of the
+    parts may weigh as much and lies on another path."""
+    return len(paths({"load": load, "design": design_load})) == 1
+
+
+def load_record(
+    shell: Gridshell, design: Design, loaded: Loaded, load: Reals, factor: float, *, multiple: bool = True
+) -> LoadRecord:
+    """The record of a design under a `load` (n, 6), which weighs so many times as much as the design load and
+    may be a `multiple` of it."""
     state = loaded.equilibrium.state
     away, pull = deviations(shell, state), shell.cables(design).tension(state)
     beams = shell.beams(design.radius)
@@ -146,6 +163,7 @@ def load_record(shell: Gridshell, design: Design, loaded: Loaded, load: Reals, f
         cable_force_min=float(pull.min()) if len(pull) else 0.0,
         cables_slack=int((pull <= 0.0).sum()),
         slack=slack_names(pull),
+        multiple=multiple,
     )
 
 

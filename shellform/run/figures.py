@@ -217,11 +217,12 @@ def draw_failure(run: Run) -> list[Path]:
     panel = maps.panel_of(
         run.shell_of(told.design),
         run.designs[told.design],
-        State(maps.sunk(data["positions"], data["mode"][:, :3]), data["quaternions"]),
+        State(data["positions"], data["quaternions"]),
         load=run.loads[told.load],
         title=f"{told.design} design, structure {told.number} as it fails at {told.factor:.2f} of {_LOADS.get(told.load, told.load)}",
     )
     make_folder(file.parent)
+    panel = maps.drawn_out(panel, data["mode"][:, :3])
     render.pictures([file], [titled(run, panel)], look_of(run, Wish(), [panel]))
     return [file]
 
@@ -363,11 +364,7 @@ def look_of(run: Run, wish: Wish, panels: Sequence[Any]) -> Any:
 
 
 def write_states(
-    folder: Path,
-    shell: Gridshell,
-    name: str,
-    design: Design,
-    states: Mapping[str, State],
+    folder: Path, shell: Gridshell, name: str, design: Design, states: Mapping[str, State]
 ) -> None:
     """states/NAME-LOAD.vtp: the loaded geometry with deviations, m, and the end forces of rods and edge
     beams.

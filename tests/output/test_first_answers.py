@@ -40,6 +40,11 @@ def test_a_shell_that_stands_as_built_is_safe_and_the_detail_tells_how_far_off_i
     )
 
 
+def test_no_factor_is_told_of_an_additional_load_that_is_no_multiple_of_the_design_load():
+    assert safe(multiple=False).question == "Is it safe under the additional load?"
+    assert safe(factor=1.0, multiple=True).question == "Is it safe at 1 × the load?"
+
+
 @pytest.mark.parametrize(
     ("changed", "words", "good"),
     [

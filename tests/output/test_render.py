@@ -375,6 +375,22 @@ def test_large_forces_are_told_in_kilonewtons_and_rounding_as_nothing():
     )
 
 
+@pytest.mark.parametrize(
+    ("taut", "words"),
+    [
+        (64, "; 64 cables, 12 N at most"),
+        (9, "; 9 of 64 cables taut, 12 N at most"),
+        (0, "; 0 of 64 cables taut"),
+    ],
+)
+def test_cables_that_hang_slack_are_counted_too(taut, words):
+    forces = np.where(np.arange(64) < taut, 12.0, 0.0)
+    some = replace(panel(), cable_forces=forces)
+    told = legend.title(some, scale_of([some], SMALL, SIZE), SIZE)[1].text
+    assert told.endswith(f" mm{words}")
+    assert "cable" not in legend.title(bare(), scale_of([bare()], SMALL, SIZE), SIZE)[1].text
+
+
 @pytest.mark.parametrize("force", [10.8, 16.4, 0.37, 3.0, 99.6, 1234.0])
 def test_a_number_of_the_key_lies_within_a_hundredth_of_the_scale_from_its_tick(force):
     strong = replace(panel(), cable_forces=force / panel().cable_forces.max() * panel().cable_forces)

@@ -266,6 +266,11 @@ def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
         [],
         [],
     )
+    assert report.viewed(run).load_titles == {"none": "no load", "design": "the design load"}
+    other = replace(run, loads={"additional": loads["design"]})
+    assert report.viewed(other).load_titles == {"additional": "1.2 × the load"}
+    apart = replace(other, summary=summary({"initial": design}, "additional", multiple=False))
+    assert report.viewed(apart).load_titles == {"additional": "the additional load"}
     seen = report.viewed(run)
     drawn = view_data.view_data(seen)
     farthest = 1e3 * np.linalg.norm(moved.positions - shell.target.positions, axis=1).max()

@@ -47,6 +47,18 @@ def test_a_summary_is_read_back_as_it_was_written(tmp_path):
     assert read_summary(tmp_path / "nowhere") == Summary()
 
 
+def test_whether_a_load_is_a_multiple_of_the_design_load_is_kept_and_taken_for_granted_of_older_runs(
+    tmp_path,
+):
+    other = load("additional", factor=0.652, multiple=False)
+    write_summary(tmp_path, summary(NAMES).with_design("polished", design(loads={"additional": other})))
+    rows = read_summary(tmp_path).designs
+    assert rows["polished"].loads["additional"].times is None
+    assert rows["initial"].loads["additional"].times == 1.2
+    changed(tmp_path, lambda found: found["designs"]["polished"]["loads"]["additional"].pop("multiple"))
+    assert read_summary(tmp_path).designs["polished"].loads["additional"].times == 0.652
+
+
 def test_what_is_not_known_is_left_out_but_for_what_stands_beside_a_number():
     found = document(summary(NAMES, "design", critical_sought=3.0))
     row = found["designs"]["optimised"]["loads"]["design"]

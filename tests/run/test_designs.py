@@ -117,6 +117,11 @@ def test_a_design_s_record_counts_by_its_cables_and_by_the_design_load(monkeypat
     assert found.cable_force_max == 7.0
     factors = {name: row.factor for name, row in found.loads.items()}
     assert factors == {"none": 0.0, "design": 1.0, "wind": -0.375}
+    assert {name: row.multiple for name, row in found.loads.items()} == {
+        "none": True,
+        "design": True,
+        "wind": False,
+    }
     assert math.copysign(1.0, factors["none"]) == 1.0, "no -0"
     row = found.loads["wind"]
     assert (row.deviation_max, row.deviation_mean) == (0.004, pytest.approx(7e-3 / 3))
@@ -128,6 +133,25 @@ def test_a_design_s_record_counts_by_its_cables_and_by_the_design_load(monkeypat
     assert row.slack == ("C1", "C3")
     with np.load(tmp_path / "designs/initial.npz") as kept:
         assert {"design_positions", "none_quaternions", "rest_length"} < set(kept)
+
+
+@pytest.mark.parametrize(
+    ("parts", "multiple"),
+    [
+        ((1.2, 1.2), True),
+        ((0.3, 0.3), True),
+        ((0.0, 0.0), True),
+        ((1.2, 1.0), False),
+        ((0.0, 4.0 / 3.0), False),  # weighs as much
+        ((1.0, 1.0 + 1e-6), False),
+        ((-1.0, -1.0), False),  # pulls upwards
+    ],
+)
+def test_a_load_is_a_multiple_of_the_design_load_where_all_its_parts_are(parts, multiple):
+    own, concrete = np.zeros((2, 4, 6))
+    own[:, 2], concrete[1:, 2] = -0.1, -6.9
+    load = parts[0] * own + parts[1] * concrete
+    assert module._is_multiple(load, own + concrete) is multiple
 
 
 def test_cables_without_pull_are_named_as_in_the_schedules():

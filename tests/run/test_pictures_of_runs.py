@@ -11,10 +11,11 @@ from PIL import Image
 
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
+from shellform.output.pictures import render
 from shellform.output.pictures.panel import scale_end
 from shellform.problem.paths import deviations
 from shellform.run import films
-from shellform.run.figures import Wish, draw_designs, draw_run, look_of, panel_of, wish
+from shellform.run.figures import FAILURE, Wish, draw_designs, draw_failure, draw_run, look_of, panel_of, wish
 from shellform.run.films import draw_film
 from shellform.run.folder import read_run
 from shellform.run.scales import colour_limit
@@ -118,6 +119,28 @@ def test_one_scale_of_colours_and_one_of_forces_hold_for_all_panels(run):
 
 def test_titles_name_design_and_load(run):
     assert panel_of(run, "initial", "additional").title == "initial design, additional load"
+
+
+def test_the_picture_of_a_failure_tells_the_numbers_of_the_state_that_fails_not_of_the_mode_drawn_out(
+    run, tmp_path, monkeypatch
+):
+    state, shown = run.states["initial"]["design"], []
+    mode = np.zeros((len(state.positions), 6))
+    mode[:, 2] = -1.0
+    (tmp_path / "states").mkdir()
+    np.savez(tmp_path / FAILURE, positions=state.positions, quaternions=state.quaternions, mode=mode)
+    failure = SimpleNamespace(design="initial", load="design", number=7, factor=0.91)
+    monkeypatch.setattr(render, "pictures", lambda files, panels, look: shown.extend(panels))
+    failing = replace(run, folder=tmp_path, summary=replace(run.summary, failure=failure))
+    assert names(draw_failure(failing)) == ["failure.png"]
+    (seen,) = shown
+    usual = panel_of(run, "initial", "design")
+    assert seen.deviation == pytest.approx(usual.deviation)
+    assert seen.cable_forces == pytest.approx(usual.cable_forces)
+    assert (seen.positions[:, 2] < usual.positions[:, 2] - 1e-3).all()
+    assert seen.title.endswith(
+        "initial design, structure 7 as it fails at 0.91 of design load, the mode drawn out"
+    )
 
 
 def test_the_pour_and_the_erection_are_filmed_from_the_first_state_to_the_last(run):

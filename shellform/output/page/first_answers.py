@@ -25,6 +25,7 @@ from shellform.records.words import (
     critical_words,
     driven_words,
     listed,
+    load_title,
     shape_notes,
     standing_count_words,
 )
@@ -217,7 +218,7 @@ def _is_safe(
     rods = f", rods at {100.0 * used:.0f} % of their strength" if known else ""
     off = f"{_mm(more.deviation_max)} off at most, {_mm(more.deviation_mean)} in the mean{rods}"
     return Answer(
-        f"Is it safe at {more.factor:.3g} × the load?",
+        f"Is it safe {'under' if more.times is None else 'at'} {load_title('additional', more.times)}?",
         words,
         f"{sure}As planned {off}. {_collapse(main)}",
         safe,

@@ -124,7 +124,7 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
 
 def viewed(run: ShownRun) -> ViewedShell:
     """What of the run the view shows."""
-    titles = {name: words.load_title(name, _factor(run.summary, name)) for name in run.loads}
+    titles = {name: words.load_title(name, _times(run.summary, name)) for name in run.loads}
     return ViewedShell(
         title=run.title,
         shells=run.shells,
@@ -150,8 +150,8 @@ def _as_built(run: ShownRun, load: str) -> Cell | None:
     )
 
 
-def _factor(summary: Summary, load: str) -> float | None:
-    return next((row.loads[load].factor for row in summary.designs.values() if load in row.loads), None)
+def _times(summary: Summary, load: str) -> float | None:
+    return next((row.loads[load].times for row in summary.designs.values() if load in row.loads), None)
 
 
 def _caption(name: str) -> str:

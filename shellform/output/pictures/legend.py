@@ -89,10 +89,13 @@ def title(panel: Panel, scale: Scale, size: tuple[int, int]) -> tuple[Word, ...]
         f"{panel.quantity.split()[0]}: maximum {largest:{digits}} {name}".rstrip()
         + f", mean {mean:{digits}} {name}".rstrip()
     )
-    taut = panel.cable_forces > 0.0
-    if taut.any():
+    taut, count = int((panel.cable_forces > 0.0).sum()), len(panel.cables)
+    if count:
+        cables = how_many(count, "cable", "cables")
+        caption += f"; {cables}" if taut == count else f"; {taut} of {cables} taut"
+    if taut:
         label, size_of = _newtons(scale.force)
-        caption += f"; {how_many(int(taut.sum()), 'cable', 'cables')}, {number(float(panel.cable_forces.max()) / size_of)} {label} at most"
+        caption += f", {number(float(panel.cable_forces.max()) / size_of)} {label} at most"
     line = scale.letters
     return (
         Word(

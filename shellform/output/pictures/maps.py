@@ -8,7 +8,7 @@ Deviation from the target (7); utilisation, the bending stress over the flexural
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -122,6 +122,12 @@ def sunk(positions: Reals, shift: Reals) -> Reals:
     size = float(np.ptp(positions, axis=0).max())
     upright = 1.0 if shift[np.argmax(np.abs(shift[:, 2])), 2] <= 0.0 else -1.0
     return positions + AMPLITUDE * size * upright * shift
+
+
+def drawn_out(panel: Panel, shift: Reals) -> Panel:
+    """A panel whose nodes alone are moved along a mode, as by `sunk`, so far that it is seen: its numbers and
+    colours stay those of its state, and its title says so."""
+    return replace(panel, positions=sunk(panel.positions, shift), title=f"{panel.title}, the mode drawn out")
 
 
 QUANTITIES: dict[str, Callable[[Gridshell, Design, State], Map]] = {
