@@ -17,6 +17,10 @@ from shellform.records.thicker_rods import ThickerRodsRecord
 
 _CLOSER = 0.8  # of the spacing, where rods may not become thicker
 _EQUAL = 1e-9  # relative: radii that count as equal
+_TURNS, _LEAST = (
+    100,
+    0.5,
+)  # of the radius: rods that would have to be thinner than that aren't the same shell's
 _MOST = 100.0  # times the load: what lacks so much isn't mended by thicker rods
 
 
@@ -86,6 +90,16 @@ class RodsOf:
         if said is None:
             return f"Rods as stiff as those of {_down(1e3 * wanted)} mm radius would do, and the catalogue has none: take another (rod.catalogue)."
         return f"Take rods of at most {_down(1e3 * wanted)} mm radius ({said})."
+
+    def less_stressed(self, bending: float, stress: float, most: float) -> str:
+        """To be stressed to `most` of their strength, where they are to the share `bending` of it by that
+        alone and to `stress` with axial force: in a given shape bending goes with the radius, the stress of
+        a given force against its square, so that a force that rules wants a closer grid."""
+        axial = max(stress - bending, 0.0)
+        times = 1.0
+        for _ in range(_TURNS):  # down to the largest one that does, where there is one
+            times = (most - axial / times**2) / bending if times > _LEAST and bending > 0.0 else 0.0
+        return self.thinner(times) if times > _LEAST else self._closer()
 
     @property
     def _sizes(self) -> RodSizes:

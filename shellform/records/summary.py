@@ -161,6 +161,11 @@ class LoadRecord:
     built_shape: BuiltShapeRecord | None = None
     expected_stiffness: float | None = None
 
+    @property
+    def collapsed(self) -> bool:
+        """Whether the shell doesn't stand: its numbers are of another shape than the one that was meant."""
+        return not (self.stable and self.on_branch)
+
     def unexamined(self) -> LoadRecord:
         """Without what the stage "safety" finds."""
         return replace(

@@ -10,7 +10,8 @@ from shellform.case.build_safety import critical_factors_asked, is_required
 from shellform.case.case import Case
 from shellform.records.as_built import AsBuilt
 from shellform.records.check import Cell, Check
-from shellform.records.checks import Bounds, checks
+from shellform.records.checks import checks
+from shellform.records.limited import Bounds
 from shellform.records.stages import SHOWING
 from shellform.records.summary import VerdictRecord
 from shellform.records.verdict import to_build, verdict

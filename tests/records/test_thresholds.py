@@ -9,7 +9,8 @@ from shellform.quantities import newtons, number
 from shellform.records import words
 from shellform.records.as_built import AsBuilt, critical_checks, falls, guide_checks, standing_checks
 from shellform.records.check import SLACK, Cell, Check, below, quantity, share_of
-from shellform.records.checks import Bounds, checks
+from shellform.records.checks import checks
+from shellform.records.limited import Bounds
 from shellform.records.optimisation import CableCountRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow
 from shellform.records.summary import BuiltShapeRecord, StandingRecord
@@ -282,6 +283,62 @@ def test_a_remedy_gives_the_entry_in_the_entry_s_own_unit(shell, designs):
     )
     edges = found(shell, designs, "none", edge_utilisation_max=1.4)
     assert "1.4 times as strong" in edges["Edge beams under no load"].remedy
+
+
+@pytest.mark.parametrize("fallen", [{"stable": False}, {"on_branch": False}])
+def test_a_shape_that_has_collapsed_tells_what_makes_it_stand_and_nothing_by_its_own_numbers(
+    shell, designs, fallen
+):
+    asked = Bounds(6.0, 0.005, 0.01, 0.01, 0.01, 0.9, 0.1, 1.0, 2.0, 0.5, ("additional",))
+    beyond = {
+        "deviation_rms": 0.23, "rod_utilisation_max": 1.6, "stress_utilisation_max": 1.7, "cable_force_max": 30.0,
+        "cable_force_min": 0.1, "connector_turn_max": 0.4, "uplift_max": 3.0, "thrust_max": 4.0,
+        "edge_utilisation_max": 1.5,
+    }  # fmt: skip
+    upright = found(shell, designs, "additional", bounds=asked, **beyond)
+    remedies = {name: cell.remedy for name, cell in upright.items() if cell.holds is False}
+    assert len(remedies) == 9
+    assert all(remedies.values())
+    made = found(shell, designs, "additional", bounds=asked, **beyond, **fallen)
+    broken = {name: cell.remedy for name, cell in made.items() if cell.holds is False}
+    stands = "Stands under 1.2 × the load"
+    assert set(broken) == {*remedies, stands}
+    assert [name for name, remedy in broken.items() if remedy] == [stands]
+
+
+def test_of_two_shapes_that_are_beyond_a_limit_the_worse_one_s_remedy_counts(shell, designs):
+    asked = replace(BOUNDS, turn=0.1)
+    title = "Connectors' turning under any load"
+    for turns, remedy in ((0.4, ""), (0.2, "Allow limits.connector_turn = 0.3.")):
+        loads = {
+            "none": load("none", connector_turn_max=0.3),
+            "design": load("design", connector_turn_max=turns, on_branch=False),
+        }
+        made = summary(designs).with_design("polished", design(loads=loads))
+        cell = {c.name: c for c in checks({"polished": shell}, designs, made, asked)}[title].cells["polished"]
+        assert (cell.holds, cell.remedy) == (False, remedy)
+
+
+@pytest.mark.parametrize(
+    ("most", "bending", "stress", "remedy"),
+    [
+        (0.9, 0.93, 0.96, "Allow limits.utilisation = 0.96."),
+        (0.9, 0.97, 0.9999, "Allow limits.utilisation = 1."),
+        (1.0, 0.98, 1.0035, "Take rods of at most 0.99 mm radius (rod.radius = 0.00099)."),
+        (0.9, 0.98, 1.0035, "Take rods of at most 0.88 mm radius (rod.radius = 0.00088)."),
+        (1.2, 1.28, 1.3, "Take rods of at most 0.75 mm radius (rod.radius = 0.00075)."),
+        (1.0, 0.4, 1.1, "Choose a closer grid (net.spacing = 0.044)."),
+        (1.0, 0.0, 1.1, "Choose a closer grid (net.spacing = 0.044)."),
+    ],
+)
+def test_more_than_the_strength_is_nothing_to_allow(shell, designs, most, bending, stress, remedy):
+    """In a given shape rods of 0.98 times the radius are bent to 0.98 of the stress, and a given force
+    stresses them 1.04 times as much; a force that rules wants a closer grid, for thinner rods don't help."""
+    asked = replace(BOUNDS, stress=most)
+    made = found(
+        shell, designs, "design", bounds=asked, rod_utilisation_max=bending, stress_utilisation_max=stress
+    )
+    assert made["Rods' stress with axial force under any load"].remedy == remedy
 
 
 def test_the_largest_cable_force_is_that_of_the_worst_load_but_for_none(shell, designs):
