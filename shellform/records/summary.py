@@ -162,6 +162,11 @@ class LoadRecord:
     expected_stiffness: float | None = None
 
     @property
+    def stressed(self) -> float:
+        """The rods' stress over their strength, with axial force where that is known."""
+        return max(self.rod_utilisation_max, self.stress_utilisation_max or 0.0)
+
+    @property
     def collapsed(self) -> bool:
         """Whether the shell doesn't stand: its numbers are of another shape than the one that was meant."""
         return not (self.stable and self.on_branch)
