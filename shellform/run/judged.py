@@ -37,7 +37,13 @@ def run_checks(run: Run) -> list[Check]:
         slack_loads=tuple(limits.slack_loads),
         critical=critical_factors_asked(run.case),
         safety=asked_as_built(run.case),
-        rods=rod_sizes(run.case.rod, run.shell.rod),
+        rods=rod_sizes(
+            run.case.rod,
+            run.shell.rod,
+            free=run.case.optimise.rod_radius > 0.0,
+            keeps=limits.utilisation is not None,
+            least=run.case.optimise.radius_min,
+        ),
     )
     found = checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
     if run.summary.sketch:

@@ -383,21 +383,49 @@ def test_thicker_rods_are_named_up_to_what_the_net_allows_and_not_beyond():
 
 
 def test_of_sections_that_are_sold_the_next_one_is_named_an_equal_one_included():
-    sold = RodSizes({}, [("S", 0.001), ("M", 0.0011), ("L", 0.0012)])
-    assert sold.at_least(0.001, 0.0011) == 'rod.section = "M"'
-    assert sold.at_least(0.001, 0.0011 * (1.0 + 1e-12)) == 'rod.section = "M"'
-    assert sold.at_least(0.001, 0.0011 * (1.0 + 1e-8)) == 'rod.section = "L"'
-    assert sold.at_least(0.001, 0.00121) is None
-    assert sold.at_most(0.001, 0.0011) == 'rod.section = "M"'
-    assert sold.at_most(0.001, 0.0011 * (1.0 - 1e-12)) == 'rod.section = "M"'
-    assert sold.at_most(0.001, 0.0011 * (1.0 - 1e-8)) == 'rod.section = "S"'
-    assert sold.at_most(0.001, 0.00099) is None
+    sold = RodSizes({}, 0.001, [("S", 0.001), ("M", 0.0011), ("L", 0.0012)])
+    assert sold.at_least(0.0011) == 'rod.section = "M"'
+    assert sold.at_least(0.0011 * (1.0 + 1e-12)) == 'rod.section = "M"'
+    assert sold.at_least(0.0011 * (1.0 + 1e-8)) == 'rod.section = "L"'
+    assert sold.at_least(0.00121) is None
+    assert sold.at_most(0.0011) == 'rod.section = "M"'
+    assert sold.at_most(0.0011 * (1.0 - 1e-12)) == 'rod.section = "M"'
+    assert sold.at_most(0.0011 * (1.0 - 1e-8)) == 'rod.section = "S"'
+    assert sold.at_most(0.00099) is None
+
+
+def test_remedies_for_rods_of_another_radius_than_the_case_s_name_the_radius_that_they_say():
+    """As of a search that was free to take 1.31 mm where the case begins with 1.4."""
+    rods = RodsOf(0.00131, 0.002, 0.05, None, RodSizes({"rod.radius": 0.0014}, 0.0014, (), True, True))
+    assert rods.stronger(1.1) == "Take rods of at least 1.4 mm radius (optimise.radius_min = 0.0014)."
+    assert rods.stronger(1.2) == (
+        "Take rods of at least 1.5 mm radius (rod.radius = 0.0015, optimise.radius_min = 0.0015)."
+    )
+    assert rods.thinner(1.0 / 1.02) == (
+        "Begin the search with rods of at most 1.2 mm radius (rod.radius = 0.0012), or give it twice the evaluations "
+        "(optimise.evaluations)."
+    )
+    bound = replace(rods, sizes=replace(rods.sizes, least=0.0013))
+    assert "(rod.radius = 0.0012, optimise.radius_min = 0.0012)" in bound.thinner(1.0 / 1.02)
+    seen = replace(rods, thicker=ThickerRodsRecord(0.0016, 39, 40, None))
+    assert "1.6 mm radius (rod.radius = 0.0016, optimise.radius_min = 0.0016)" in seen.stronger(1.1)
+    unkept = replace(rods, sizes=replace(rods.sizes, keeps=False))
+    assert unkept.thinner(0.9) == "Let the search keep the rods' strength (limits.utilisation = 1)."
+    fixed = replace(rods, sizes=RodSizes({"rod.radius": 0.0014}, 0.0014))
+    assert fixed.stronger(1.1) == (
+        "Take rods of at least 1.4 mm radius (rod.radius = 0.0014), or let it be free (optimise.rod_radius = 0.1)."
+    )
+    sold = RodSizes({}, 0.0014, [("S", 0.0014), ("M", 0.00146), ("L", 0.0016)], True)
+    assert sold.kept_at_least(0.00144) == 'rod.section = "L", optimise.radius_min = 0.0015', (
+        "M is below 1.5 mm"
+    )
+    assert sold.kept_at_least(0.0017) is None
 
 
 def test_numbers_of_remedies_are_rounded_to_the_side_on_which_they_hold():
-    own = RodSizes({"rod.width": 0.05, "rod.height": 0.025})
-    assert own.at_least(0.01, 0.0121) == "rod.width = 0.061, rod.height = 0.031"
-    assert own.at_most(0.01, 0.0079) == "rod.width = 0.039, rod.height = 0.019"
+    own = RodSizes({"rod.width": 0.05, "rod.height": 0.025}, 0.01)
+    assert own.at_least(0.0121) == "rod.width = 0.061, rod.height = 0.031"
+    assert own.at_most(0.0079) == "rod.width = 0.039, rod.height = 0.019"
     assert allow("cable.force_max", 21.0) == "Allow cable.force_max = 21."
     assert allow("cable.force_max", 21.01) == "Allow cable.force_max = 22."
     assert allow("limits.uplift", 0.0) == "Allow limits.uplift = 0."
