@@ -54,13 +54,21 @@ def section_of_sizes(entry: OwnRodEntry | EdgeBeamEntry, material: Material) -> 
     return Round(entry.radius, material) if entry.wall is None else Tube(entry.radius, entry.wall, material)
 
 
-def rod_sizes(entry: OwnRodEntry | StockRodEntry, rod: Rod) -> RodSizes:
-    """How the case gives the size of its rods, for remedies that name it."""
+def rod_sizes(
+    entry: OwnRodEntry | StockRodEntry,
+    rod: Rod,
+    *,
+    free: bool = False,
+    keeps: bool = False,
+    least: float | None = None,
+) -> RodSizes:
+    """How the case gives the size of its `rod`, for remedies that name it: whether the search is `free` to
+    choose the radius, m, from `least` on, and `keeps` the stress below a limit."""
     if isinstance(entry, StockRodEntry):
         single = read_catalogue(entry.catalogue).sections
-        return RodSizes({}, [(label(each), radius_as_stiff(rod, layered(entry, each))) for each in single])
+        bought = [(label(each), radius_as_stiff(rod, layered(entry, each))) for each in single]
+        return RodSizes({}, rod.radius, bought, free, keeps, least or 0.0)
     names = ("radius", "wall", "width", "height")
     given = {f"rod.{name}": getattr(entry, name) for name in names}
-    return RodSizes(
-        {name: value for name, value in given.items() if value is not None} or {"rod.radius": rod.radius}
-    )
+    sizes = {name: value for name, value in given.items() if value is not None}
+    return RodSizes(sizes or {"rod.radius": rod.radius}, rod.radius, (), free, keeps, least or 0.0)

@@ -216,7 +216,9 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         model = search.models.at(it.point)
         leaving = _leaving(search, it, model)
         if not len(leaving):
-            return replace(it, status=f"{it.status}, and every cable that is left is needed for stability")
+            some = taut_count(search, it.point) > 0
+            rest = "every cable that is left is needed for stability" if some else "no cable is left"
+            return replace(it, status=f"{it.status}, and {rest}")
         tensioned = _tensioned(search, it)
         tensioned[leaving] = False
         it = replace(it, tensioned=tensioned, fell=False)

@@ -9,15 +9,16 @@ that was computed. Numbers stand in the units in which people read them: mm, N, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
-from shellform.quantities import newtons, number
-from shellform.records.as_built import AsBuilt, critical_checks, guide_checks, standing_checks
-from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, Subject, below, quantity, share_of
+from shellform.quantities import number
+from shellform.records.as_built import critical_checks, guide_checks, standing_checks
+from shellform.records.check import SLACK, UNASKED, Cell, Check, Subject, below, share_of
+from shellform.records.limited import Bounds, limited
 from shellform.records.optimisation import OptimisationRecord
-from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count, allow_less
+from shellform.records.remedies import RodsOf, allow, allow_count
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
 from shellform.records.words import constraint_titles, load_title
 
@@ -27,31 +28,6 @@ _AT_LEAST = ("softness", "slackness")  # of which as much is demanded, not at mo
 # Unbalanced over largest force: what an equilibrium that counts as found stays below.
 _SETTLED, _SETTLED_TOLD = 1e-6, "unbalanced force up to a millionth of the largest"
 _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or loosen the limit."
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
-    mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) the largest
-    `deviation`, m, under the design load, of the perfect structure and as `built`, and `unloaded`; `stress`
-    over strength, connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull
-    `slack`, N, of cables under the `slack_loads`, and by load the least `critical` factor; what is asked of
-    structures as built (`safety`); and how the case gives its `rods`' size."""
-
-    force: float
-    misfit: float
-    deviation: float | None = None
-    built: float | None = None
-    unloaded: float | None = None
-    stress: float | None = None
-    turn: float | None = None
-    uplift: float | None = None
-    thrust: float | None = None
-    slack: float | None = None
-    slack_loads: tuple[str, ...] = ()
-    critical: Mapping[str, float] = field(default_factory=dict)
-    safety: AsBuilt | None = None
-    rods: RodSizes | None = None
 
 
 @dataclass(frozen=True)
@@ -110,12 +86,12 @@ def checks(
         *judged.under(
             "Rods",
             "stress up to 100 % of the strength",
-            lambda row, rods: _stressed(_stress(row), rods),
+            _if_standing(lambda row, rods: _stressed(_stress(row), rods)),
             loads,
         ),
         *_of_edge_beams(judged),
         Check("Rods bent into the shape (1)", "up to 100 % of the curvature they bear", bent),
-        *_limited(rows, list(designs), bounds),
+        *limited(rows, rods, bounds),
         *_deviating(judged, bounds),
         *_of_the_optimiser(summary.optimisation, rows, list(designs)),
         *judged.under(
@@ -133,7 +109,9 @@ def _of_edge_beams(judged: _Judged) -> list[Check]:
     if not any(row.edge_utilisation_max for row in every):
         return []
     limit = "stress up to 100 % of the strength"
-    return judged.under("Edge beams", limit, lambda row, rods: _edged(row), list(judged.factors))
+    return judged.under(
+        "Edge beams", limit, _if_standing(lambda row, rods: _edged(row)), list(judged.factors)
+    )
 
 
 def _deviating(judged: _Judged, bounds: Bounds) -> list[Check]:
@@ -142,11 +120,13 @@ def _deviating(judged: _Judged, bounds: Bounds) -> list[Check]:
     found = judged.under(
         "Deviation",
         f"{number(most)} mm",
-        lambda row, rods: below(
-            1e3 * row.deviation_rms,
-            most,
-            "mm",
-            allow("optimise.misfit_rms_additional", row.deviation_rms, or_else="take thicker rods"),
+        _if_standing(
+            lambda row, rods: below(
+                1e3 * row.deviation_rms,
+                most,
+                "mm",
+                allow("optimise.misfit_rms_additional", row.deviation_rms, or_else="take thicker rods"),
+            )
         ),
         [load for load in judged.factors if load not in ("none", "design")],
     )
@@ -161,146 +141,12 @@ def _stress(row: LoadRecord) -> float:
     return max(row.rod_utilisation_max, row.rod_utilisation_max - 0.75 * error)
 
 
-def _deviation(row: LoadRecord) -> float:
-    """The largest, m, on the mesh on which it is larger, likewise."""
-    return max(row.deviation_max, row.deviation_max - 0.75 * (row.deviation_max_error or 0.0))
-
-
-def _built_deviation(row: DesignRecord) -> float | None:
-    """The worst, m, of the drawn structures that were looked at; of one that fell before there is none."""
-    shape = None if "design" not in row.loads else row.loads["design"].built_shape
-    return None if shape is None else shape.deviation_max_worst
-
-
-def _unloaded_deviation(row: DesignRecord) -> float | None:
-    """The largest, m, before any load."""
-    return None if "none" not in row.loads else _deviation(row.loads["none"])
-
-
 def _edged(row: LoadRecord) -> Cell:
     """The stress of edge beams over their strength."""
     share = row.edge_utilisation_max or 0.0
     return share_of(
         share, f"Take edge beams {share:.1f} times as strong (edges.beam: more rods, or a section)."
     )
-
-
-@dataclass(frozen=True)
-class _Limit:
-    """One that an engineer set, or (5): its `title`, the `most` of what is limited (None: not limited), in
-    the unit of the case's `entry`; the `unit` in which people read it, so many of which (`times`) make one of
-    the entry's; and a design's `value`, in the entry's unit."""
-
-    title: str
-    entry: str
-    most: float | None
-    value: Callable[[DesignRecord], float | None]
-    unit: str
-    times: float = 1.0
-
-
-def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: Bounds) -> list[Check]:
-    """Constraint (5), and what an engineer limits, each at its worst over the load cases."""
-
-    def worst(value: Callable[[LoadRecord], float | None]) -> Callable[[DesignRecord], float | None]:
-        return lambda row: _largest(value(each) for each in row.loads.values())
-
-    pulled = _Limit(
-        "Largest cable force under the design load and those beyond it (5)",
-        "cable.force_max",
-        bounds.force,
-        lambda row: (
-            _largest(each.cable_force_max for load, each in row.loads.items() if load != "none")
-            or row.cable_force_max
-        ),
-        "N",
-    )
-    limits = [
-        _Limit(
-            "Largest deviation under the design load",
-            "limits.deviation",
-            bounds.deviation,
-            lambda row: _deviation(row.loads["design"]) if "design" in row.loads else None,
-            "mm",
-            1e3,
-        ),
-        _Limit(
-            "Largest deviation as built under the design load",
-            "limits.built_deviation",
-            bounds.built,
-            _built_deviation,
-            "mm",
-            1e3,
-        ),
-        _Limit(
-            "Largest deviation before any load",
-            "limits.unloaded_deviation",
-            bounds.unloaded,
-            _unloaded_deviation,
-            "mm",
-            1e3,
-        ),
-        _Limit(
-            "Rods' stress with axial force under any load",
-            "limits.utilisation",
-            bounds.stress,
-            worst(lambda load: load.stress_utilisation_max),
-            "% of the strength",
-            100.0,
-        ),
-        _Limit(
-            "Connectors' turning under any load",
-            "limits.connector_turn",
-            bounds.turn,
-            worst(lambda load: load.connector_turn_max),
-            "°",
-            180.0 / math.pi,
-        ),
-        _Limit(
-            "Uplift of a support under any load",
-            "limits.uplift",
-            bounds.uplift,
-            worst(lambda load: load.uplift_max),
-            "N",
-        ),
-        _Limit(
-            "Thrust on a support under any load",
-            "limits.thrust",
-            bounds.thrust,
-            worst(lambda load: load.thrust_max),
-            "N",
-        ),
-    ]
-    found = [
-        _at_most(pulled, bounds.force, rows, designs),
-        *_pulled_before(rows, designs, bounds.force),
-        *(_at_most(each, each.most, rows, designs) for each in limits if each.most is not None),
-    ]
-    if bounds.slack is not None:
-        found += [_taut(rows, designs, load, bounds.slack) for load in bounds.slack_loads]
-    return found
-
-
-def _pulled_before(rows: Mapping[str, DesignRecord], designs: Sequence[str], force: float) -> list[Check]:
-    """The largest cable force before any load, which is told and not asked for, where it is known; `force`,
-    N: the limit under load."""
-    pulls = {name: row.loads["none"].cable_force_max for name, row in rows.items() if "none" in row.loads}
-    told = {name: Cell(newtons(pull), None, False) for name, pull in pulls.items() if pull is not None}
-    cells = {name: told.get(name, UNASKED) for name in designs}
-    limit = f"told; the limit, {newtons(force)}, counts under load"
-    return [Check("Largest cable force before any load", limit, cells)] if told else []
-
-
-def _at_most(limit: _Limit, most: float, rows: Mapping[str, DesignRecord], designs: Sequence[str]) -> Check:
-    cells = {}
-    for name in designs:
-        value = limit.value(rows[name]) if name in rows else None
-        cells[name] = (
-            UNKNOWN
-            if value is None or not math.isfinite(value)
-            else below(limit.times * value, limit.times * most, limit.unit, allow(limit.entry, value))
-        )
-    return Check(limit.title, quantity(limit.times * most, limit.unit), cells)
 
 
 def _of_the_optimiser(
@@ -336,28 +182,14 @@ def _of_the_optimiser(
     return found
 
 
-def _largest(values: Iterable[float | None]) -> float | None:
-    """The largest of those that are known."""
-    return max((value for value in values if value is not None), default=None)
-
-
-def _taut(rows: Mapping[str, DesignRecord], designs: Sequence[str], load: str, least: float) -> Check:
-    """The least pull of a cable."""
-    cells = {}
-    for name in designs:
-        row = rows[name].loads.get(load) if name in rows else None
-        pull = None if row is None else row.cable_force_min
-        remedy = (
-            allow_less("limits.slack_min", pull) if pull else "Leave limits.slack_min out, or let it be 0.01."
-        )
-        cells[name] = (
-            UNKNOWN if pull is None else Cell(newtons(pull), pull >= least * (1.0 - SLACK), remedy=remedy)
-        )
-    return Check(f"Least pull of a cable under {load_title(load)}", f"at least {newtons(least)}", cells)
+def _if_standing(cell: Callable[[LoadRecord, RodsOf], Cell]) -> Callable[[LoadRecord, RodsOf], Cell]:
+    """Without a remedy where the shape has collapsed: numbers of that one say nothing of the one that stands,
+    and what makes it stand is told where it doesn't."""
+    return lambda row, rods: replace(cell(row, rods), remedy="") if row.collapsed else cell(row, rods)
 
 
 def _stands(row: LoadRecord, rods: RodsOf) -> Cell:
-    if row.stable and row.on_branch:
+    if not row.collapsed:
         return Cell("stands", True)
     factor = row.critical_factor
     remedy = rods.stronger(1.0 / factor if factor else math.inf)

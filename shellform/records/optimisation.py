@@ -30,8 +30,9 @@ class OptimisationRecord:
 
     - `objective_start`, `objective_end`; `status`: a sentence on why it ended.
     - `constraints`: value over limit less 1, by name; `feasible`: whether the optimised design keeps them.
-    - `iterations`, `evaluations` (so many of them `rejected`), solved `equilibria`, and `factorisations`
-      (those of rejected evaluations: `factorisations_rejected`): the work that it took.
+    - `iterations`, `evaluations` (`rejected` ones left the stable branch; those that were none better too
+      are marked in history.csv), solved `equilibria`, and `factorisations` (those of rejected evaluations:
+      `factorisations_rejected`): the work that it took.
     - `stiffness_min`, N/m, that the softest mode had to keep.
     - `not_polished`: why it wasn't.
     - `cables_max`, `symmetric`: what came of these wishes.

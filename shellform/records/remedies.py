@@ -17,31 +17,54 @@ from shellform.records.thicker_rods import ThickerRodsRecord
 
 _CLOSER = 0.8  # of the spacing, where rods may not become thicker
 _EQUAL = 1e-9  # relative: radii that count as equal
+_TURNS, _LEAST = (
+    100,
+    0.5,
+)  # of the radius: rods that would have to be thinner than that aren't the same shell's
 _MOST = 100.0  # times the load: what lacks so much isn't mended by thicker rods
 
 
 @dataclass(frozen=True)
 class RodSizes:
-    """How a case gives the size of its rods: the `entries` that grow with it and their values, m; or what is
-    `bought`, from a catalogue: each section's name and the radius, m, of a rod similar to the case's that is
-    as stiff, by rising stiffness."""
+    """How a case gives the size of its rods: the `entries` that grow with it and their values, m, of rods of
+    the `radius`, m; or what is `bought`, from a catalogue: each section's name and the radius, m, of a rod
+    similar to the case's that is as stiff, by rising stiffness. Whether the search is `free` to choose the
+    radius, not below `least`, m, and `keeps` the stress of the rods below a limit."""
 
     entries: Mapping[str, float]
+    radius: float
     bought: Sequence[tuple[str, float]] = ()
+    free: bool = False
+    keeps: bool = False
+    least: float = 0.0
 
-    def at_least(self, radius: float, wanted: float) -> str | None:
-        """What to write for rods as stiff as similar ones of the radius `wanted`, those there are having
-        `radius`, m; None where no catalogue has them."""
+    def at_least(self, wanted: float) -> str | None:
+        """What to write for rods as stiff as similar ones of the radius `wanted`, m; None where no catalogue
+        has them."""
         if self.bought:
             return next((_section(name) for name, own in self.bought if own >= wanted * (1.0 - _EQUAL)), None)
-        return ", ".join(f"{name} = {_up(value * wanted / radius)}" for name, value in self.entries.items())
+        return ", ".join(
+            f"{name} = {_up(value * wanted / self.radius)}" for name, value in self.entries.items()
+        )
 
-    def at_most(self, radius: float, wanted: float) -> str | None:
+    def at_most(self, wanted: float) -> str | None:
         """As `at_least`, for rods no stiffer."""
         if self.bought:
             below = [_section(name) for name, own in self.bought if own <= wanted * (1.0 + _EQUAL)]
             return below[-1] if below else None
-        return ", ".join(f"{name} = {_down(value * wanted / radius)}" for name, value in self.entries.items())
+        return ", ".join(
+            f"{name} = {_down(value * wanted / self.radius)}" for name, value in self.entries.items()
+        )
+
+    def kept_at_least(self, wanted: float) -> str | None:
+        """As `at_least`, for a search that is free to take thinner ones: the bound from below, which mustn't
+        be above the rods that it starts from, and those where they are thinner."""
+        least = rounded_up(wanted)
+        bound = f"optimise.radius_min = {_up(wanted)}"
+        if least <= self.radius:
+            return bound
+        start = self.at_least(least)
+        return None if start is None else f"{start}, {bound}"
 
 
 @dataclass(frozen=True)
@@ -61,7 +84,7 @@ class RodsOf:
         if self.thicker is not None:
             found = self.thicker
             what = (
-                f"rods of {_up(1e3 * found.radius)} mm radius ({self._sizes.at_least(self.radius, found.radius)})"
+                f"rods of {_up(1e3 * found.radius)} mm radius ({self._written(found.radius)})"
                 if found.section is None
                 else f"rods of {found.section} ({_section(found.section)})"
             )
@@ -69,9 +92,10 @@ class RodsOf:
         if not 1.0 < times < _MOST:
             return self._closer()
         wanted = self.radius * math.sqrt(times)
-        said = self._sizes.at_least(self.radius, wanted)
+        said = self._written(wanted)
         if wanted <= self.largest and said is not None:
-            return f"Take rods of at least {_up(1e3 * wanted)} mm radius ({said}), or let it be free (optimise.rod_radius = 0.1)."
+            free = "" if self._sizes.free else ", or let it be free (optimise.rod_radius = 0.1)"
+            return f"Take rods of at least {_up(1e3 * wanted)} mm radius ({said}){free}."
         if said is None:
             return f"Rods as stiff as those of {_up(1e3 * wanted)} mm radius would do, and the catalogue has none. {self._closer()}"
         return (
@@ -82,14 +106,35 @@ class RodsOf:
     def thinner(self, times: float) -> str:
         """To have that part of their stress."""
         wanted = self.radius * times
-        said = self._sizes.at_most(self.radius, wanted)
+        if self._sizes.free and not self._sizes.keeps:
+            return "Let the search keep the rods' strength (limits.utilisation = 1)."
+        said = self._sizes.at_most(wanted)
         if said is None:
             return f"Rods as stiff as those of {_down(1e3 * wanted)} mm radius would do, and the catalogue has none: take another (rod.catalogue)."
+        if self._sizes.free:  # a search that keeps the strength ends sooner where it begins with it kept
+            if float(_down(wanted)) < self._sizes.least:
+                said += f", optimise.radius_min = {_down(wanted)}"
+            return f"Begin the search with rods of at most {_down(1e3 * wanted)} mm radius ({said}), or give it twice the evaluations (optimise.evaluations)."
         return f"Take rods of at most {_down(1e3 * wanted)} mm radius ({said})."
+
+    def less_stressed(self, bending: float, stress: float, most: float) -> str:
+        """To be stressed to `most` of their strength, where they are to the share `bending` of it by that
+        alone and to `stress` with axial force: in a given shape bending goes with the radius, the stress of
+        a given force against its square, so that a force that rules wants a closer grid."""
+        axial = max(stress - bending, 0.0)
+        times = 1.0
+        for _ in range(_TURNS):  # down to the largest one that does, where there is one
+            times = (most - axial / times**2) / bending if times > _LEAST and bending > 0.0 else 0.0
+        return self.thinner(times) if times > _LEAST else self._closer()
 
     @property
     def _sizes(self) -> RodSizes:
-        return self.sizes or RodSizes({"rod.radius": self.radius})
+        return self.sizes or RodSizes({"rod.radius": self.radius}, self.radius)
+
+    def _written(self, wanted: float) -> str | None:
+        """What to write for rods of the radius, m, or thicker ones."""
+        sizes = self._sizes
+        return sizes.kept_at_least(wanted) if sizes.free else sizes.at_least(wanted)
 
     def _closer(self) -> str:
         if self.spacing is None:

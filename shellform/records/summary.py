@@ -168,6 +168,16 @@ class LoadRecord:
         """How many times the design load this one is; None where it is no multiple of it."""
         return self.factor if self.multiple else None
 
+    @property
+    def stressed(self) -> float:
+        """The rods' stress over their strength, with axial force where that is known."""
+        return max(self.rod_utilisation_max, self.stress_utilisation_max or 0.0)
+
+    @property
+    def collapsed(self) -> bool:
+        """Whether the shell doesn't stand: its numbers are of another shape than the one that was meant."""
+        return not (self.stable and self.on_branch)
+
     def unexamined(self) -> LoadRecord:
         """Without what the stage "safety" finds."""
         return replace(

@@ -10,7 +10,8 @@ from shellform.case.build_safety import critical_factors_asked, is_required
 from shellform.case.case import Case
 from shellform.records.as_built import AsBuilt
 from shellform.records.check import Cell, Check
-from shellform.records.checks import Bounds, checks
+from shellform.records.checks import checks
+from shellform.records.limited import Bounds
 from shellform.records.stages import SHOWING
 from shellform.records.summary import VerdictRecord
 from shellform.records.verdict import to_build, verdict
@@ -36,7 +37,13 @@ def run_checks(run: Run) -> list[Check]:
         slack_loads=tuple(limits.slack_loads),
         critical=critical_factors_asked(run.case),
         safety=asked_as_built(run.case),
-        rods=rod_sizes(run.case.rod, run.shell.rod),
+        rods=rod_sizes(
+            run.case.rod,
+            run.shell.rod,
+            free=run.case.optimise.rod_radius > 0.0,
+            keeps=limits.utilisation is not None,
+            least=run.case.optimise.radius_min,
+        ),
     )
     found = checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
     if run.summary.sketch:

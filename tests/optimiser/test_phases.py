@@ -367,6 +367,8 @@ def test_down_to_so_many_cables_they_go_whatever_they_cost(thinning):
 
 def test_thinning_says_what_it_ended_with(thinning):
     assert thinned().status == "settled, and every cable that is left is needed for stability"
+    thinning.count = 0
+    assert thinned().status == "settled, and no cable is left"
     assert thinned(searching(0)).status == "settled, and thinning ended with its last evaluation"
 
 

@@ -83,6 +83,15 @@ def test_no_share_of_an_unknown_strength_is_told(known):
     assert "of their strength" not in safe(rod_utilisation_max=float("inf")).detail
 
 
+@pytest.mark.parametrize(("stress", "share", "words"), [(None, 62, ""), (0.6, 62, ""), (0.66, 66, ""), (1.004, 100, "No, rods break")])  # fmt: skip
+def test_rods_are_told_to_be_stressed_as_much_as_they_are_with_axial_force_where_that_is_known(
+    stress, share, words
+):
+    told = safe(stress_utilisation_max=stress)
+    assert f"rods at {share} % of their strength" in told.detail
+    assert told.words == (words or "97 of 100 structures as built stand")
+
+
 @pytest.mark.parametrize(
     ("factor", "kind", "error", "words"),
     [
@@ -214,7 +223,10 @@ def test_what_to_buy_is_told_in_metres_and_kilograms_of_both_laths(monkeypatch, 
     summary = SimpleNamespace(
         designs={
             "best": SimpleNamespace(
-                loads={"design": MORE, "none": replace(MORE, slack=(), cable_force_max=61.0)}
+                loads={
+                    "design": replace(MORE, stress_utilisation_max=0.7),
+                    "none": replace(MORE, slack=(), cable_force_max=61.0),
+                }
             )
         },
         documents=SimpleNamespace(cut_lengths=2),
@@ -236,7 +248,7 @@ def test_what_to_buy_is_told_in_metres_and_kilograms_of_both_laths(monkeypatch, 
         == "60 N at most in one, 75 N in all, under the design load; 61 N at most before any load, more than the "
         "60 N that it may pull under load; none slack before the load"
     )
-    assert which.detail.startswith("3 rods of up to 4\u202f000 mm; at 62 % of their strength")
+    assert which.detail.startswith("3 rods of up to 4\u202f000 mm; at 70 % of their strength")
     assert ("lath by lath" in which.detail) == (layers == 2)
     assert which.detail.endswith("; the next size sold is 60 × 40 mm")
     length, mass = ("9.75 m of rod", "7.85 kg") if layers == 1 else ("19.5 m of laths, two a rod", "15.7 kg")

@@ -13,6 +13,7 @@ import shellform as sf
 from shellform.errors import InputError
 from shellform.net.edges import stand
 from shellform.net.net import Stretch
+from shellform.optimiser.optimum import Step
 from shellform.output.page import report, view_data
 from shellform.output.page.charts import line_chart
 from shellform.output.page.embed import embed
@@ -241,19 +242,17 @@ def test_a_page_of_no_run_is_refused():
         report.html([], {})
 
 
-def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
-    moved = State(shell.target.positions + 0.001, shell.target.quaternions)
-    design = shell.design()
-    states = {"none": shell.target, "design": moved}
+def run_of(shell, vault, design, moved):
+    """One with its initial design, which the design load has `moved`."""
     loads = {"none": np.zeros((len(moved.positions), 6)), "design": shell.point_load(6.9)}
-    run = ShownRun(
+    return ShownRun(
         "t",
         "p",
         {"initial": shell},
         vault,
         loads,
         {"initial": design},
-        {"initial": states},
+        {"initial": {"none": shell.target, "design": moved}},
         "initial",
         summary({"initial": design}),
         [],
@@ -266,8 +265,25 @@ def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
         [],
         [],
     )
+
+
+def test_as_many_trials_are_told_as_rejected_as_the_history_marks_so(shell, vault):
+    """The summary's own count is of those that left the stable branch: one of 29 on a vault."""
+    steps = [
+        Step(number, 1.0, {"misfit": 1.0}, {"cable_force": -0.5}, 100, 1.0, number % 2 == 0, 1.0)
+        for number in range(5)
+    ]
+    run = replace(run_of(shell, vault, shell.design(), shell.target), history=steps)
+    assert run.summary.optimisation.rejected == 1
+    assert "3 evaluations, 2 of them rejected" in report.html([run], {"shellform": "0"})
+
+
+def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
+    moved = State(shell.target.positions + 0.001, shell.target.quaternions)
+    design = shell.design()
+    run = run_of(shell, vault, design, moved)
     assert report.viewed(run).load_titles == {"none": "no load", "design": "the design load"}
-    other = replace(run, loads={"additional": loads["design"]})
+    other = replace(run, loads={"additional": run.loads["design"]})
     assert report.viewed(other).load_titles == {"additional": "1.2 × the load"}
     apart = replace(other, summary=summary({"initial": design}, "additional", multiple=False))
     assert report.viewed(apart).load_titles == {"additional": "the additional load"}

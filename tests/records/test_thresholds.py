@@ -9,7 +9,8 @@ from shellform.quantities import newtons, number
 from shellform.records import words
 from shellform.records.as_built import AsBuilt, critical_checks, falls, guide_checks, standing_checks
 from shellform.records.check import SLACK, Cell, Check, below, quantity, share_of
-from shellform.records.checks import Bounds, checks
+from shellform.records.checks import checks
+from shellform.records.limited import Bounds
 from shellform.records.optimisation import CableCountRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow
 from shellform.records.summary import BuiltShapeRecord, StandingRecord
@@ -284,6 +285,62 @@ def test_a_remedy_gives_the_entry_in_the_entry_s_own_unit(shell, designs):
     assert "1.4 times as strong" in edges["Edge beams under no load"].remedy
 
 
+@pytest.mark.parametrize("fallen", [{"stable": False}, {"on_branch": False}])
+def test_a_shape_that_has_collapsed_tells_what_makes_it_stand_and_nothing_by_its_own_numbers(
+    shell, designs, fallen
+):
+    asked = Bounds(6.0, 0.005, 0.01, 0.01, 0.01, 0.9, 0.1, 1.0, 2.0, 0.5, ("additional",))
+    beyond = {
+        "deviation_rms": 0.23, "rod_utilisation_max": 1.6, "stress_utilisation_max": 1.7, "cable_force_max": 30.0,
+        "cable_force_min": 0.1, "connector_turn_max": 0.4, "uplift_max": 3.0, "thrust_max": 4.0,
+        "edge_utilisation_max": 1.5,
+    }  # fmt: skip
+    upright = found(shell, designs, "additional", bounds=asked, **beyond)
+    remedies = {name: cell.remedy for name, cell in upright.items() if cell.holds is False}
+    assert len(remedies) == 9
+    assert all(remedies.values())
+    made = found(shell, designs, "additional", bounds=asked, **beyond, **fallen)
+    broken = {name: cell.remedy for name, cell in made.items() if cell.holds is False}
+    stands = "Stands under 1.2 × the load"
+    assert set(broken) == {*remedies, stands}
+    assert [name for name, remedy in broken.items() if remedy] == [stands]
+
+
+def test_of_two_shapes_that_are_beyond_a_limit_the_worse_one_s_remedy_counts(shell, designs):
+    asked = replace(BOUNDS, turn=0.1)
+    title = "Connectors' turning under any load"
+    for turns, remedy in ((0.4, ""), (0.2, "Allow limits.connector_turn = 0.3.")):
+        loads = {
+            "none": load("none", connector_turn_max=0.3),
+            "design": load("design", connector_turn_max=turns, on_branch=False),
+        }
+        made = summary(designs).with_design("polished", design(loads=loads))
+        cell = {c.name: c for c in checks({"polished": shell}, designs, made, asked)}[title].cells["polished"]
+        assert (cell.holds, cell.remedy) == (False, remedy)
+
+
+@pytest.mark.parametrize(
+    ("most", "bending", "stress", "remedy"),
+    [
+        (0.9, 0.93, 0.96, "Allow limits.utilisation = 0.96."),
+        (0.9, 0.97, 0.9999, "Allow limits.utilisation = 1."),
+        (1.0, 0.98, 1.0035, "Take rods of at most 0.99 mm radius (rod.radius = 0.00099)."),
+        (0.9, 0.98, 1.0035, "Take rods of at most 0.88 mm radius (rod.radius = 0.00088)."),
+        (1.2, 1.28, 1.3, "Take rods of at most 0.75 mm radius (rod.radius = 0.00075)."),
+        (1.0, 0.4, 1.1, "Choose a closer grid (net.spacing = 0.044)."),
+        (1.0, 0.0, 1.1, "Choose a closer grid (net.spacing = 0.044)."),
+    ],
+)
+def test_more_than_the_strength_is_nothing_to_allow(shell, designs, most, bending, stress, remedy):
+    """In a given shape rods of 0.98 times the radius are bent to 0.98 of the stress, and a given force
+    stresses them 1.04 times as much; a force that rules wants a closer grid, for thinner rods don't help."""
+    asked = replace(BOUNDS, stress=most)
+    made = found(
+        shell, designs, "design", bounds=asked, rod_utilisation_max=bending, stress_utilisation_max=stress
+    )
+    assert made["Rods' stress with axial force under any load"].remedy == remedy
+
+
 def test_the_largest_cable_force_is_that_of_the_worst_load_but_for_none(shell, designs):
     name = "Largest cable force under the design load and those beyond it (5)"
     loads = {
@@ -326,21 +383,49 @@ def test_thicker_rods_are_named_up_to_what_the_net_allows_and_not_beyond():
 
 
 def test_of_sections_that_are_sold_the_next_one_is_named_an_equal_one_included():
-    sold = RodSizes({}, [("S", 0.001), ("M", 0.0011), ("L", 0.0012)])
-    assert sold.at_least(0.001, 0.0011) == 'rod.section = "M"'
-    assert sold.at_least(0.001, 0.0011 * (1.0 + 1e-12)) == 'rod.section = "M"'
-    assert sold.at_least(0.001, 0.0011 * (1.0 + 1e-8)) == 'rod.section = "L"'
-    assert sold.at_least(0.001, 0.00121) is None
-    assert sold.at_most(0.001, 0.0011) == 'rod.section = "M"'
-    assert sold.at_most(0.001, 0.0011 * (1.0 - 1e-12)) == 'rod.section = "M"'
-    assert sold.at_most(0.001, 0.0011 * (1.0 - 1e-8)) == 'rod.section = "S"'
-    assert sold.at_most(0.001, 0.00099) is None
+    sold = RodSizes({}, 0.001, [("S", 0.001), ("M", 0.0011), ("L", 0.0012)])
+    assert sold.at_least(0.0011) == 'rod.section = "M"'
+    assert sold.at_least(0.0011 * (1.0 + 1e-12)) == 'rod.section = "M"'
+    assert sold.at_least(0.0011 * (1.0 + 1e-8)) == 'rod.section = "L"'
+    assert sold.at_least(0.00121) is None
+    assert sold.at_most(0.0011) == 'rod.section = "M"'
+    assert sold.at_most(0.0011 * (1.0 - 1e-12)) == 'rod.section = "M"'
+    assert sold.at_most(0.0011 * (1.0 - 1e-8)) == 'rod.section = "S"'
+    assert sold.at_most(0.00099) is None
+
+
+def test_remedies_for_rods_of_another_radius_than_the_case_s_name_the_radius_that_they_say():
+    """As of a search that was free to take 1.31 mm where the case begins with 1.4."""
+    rods = RodsOf(0.00131, 0.002, 0.05, None, RodSizes({"rod.radius": 0.0014}, 0.0014, (), True, True))
+    assert rods.stronger(1.1) == "Take rods of at least 1.4 mm radius (optimise.radius_min = 0.0014)."
+    assert rods.stronger(1.2) == (
+        "Take rods of at least 1.5 mm radius (rod.radius = 0.0015, optimise.radius_min = 0.0015)."
+    )
+    assert rods.thinner(1.0 / 1.02) == (
+        "Begin the search with rods of at most 1.2 mm radius (rod.radius = 0.0012), or give it twice the evaluations "
+        "(optimise.evaluations)."
+    )
+    bound = replace(rods, sizes=replace(rods.sizes, least=0.0013))
+    assert "(rod.radius = 0.0012, optimise.radius_min = 0.0012)" in bound.thinner(1.0 / 1.02)
+    seen = replace(rods, thicker=ThickerRodsRecord(0.0016, 39, 40, None))
+    assert "1.6 mm radius (rod.radius = 0.0016, optimise.radius_min = 0.0016)" in seen.stronger(1.1)
+    unkept = replace(rods, sizes=replace(rods.sizes, keeps=False))
+    assert unkept.thinner(0.9) == "Let the search keep the rods' strength (limits.utilisation = 1)."
+    fixed = replace(rods, sizes=RodSizes({"rod.radius": 0.0014}, 0.0014))
+    assert fixed.stronger(1.1) == (
+        "Take rods of at least 1.4 mm radius (rod.radius = 0.0014), or let it be free (optimise.rod_radius = 0.1)."
+    )
+    sold = RodSizes({}, 0.0014, [("S", 0.0014), ("M", 0.00146), ("L", 0.0016)], True)
+    assert sold.kept_at_least(0.00144) == 'rod.section = "L", optimise.radius_min = 0.0015', (
+        "M is below 1.5 mm"
+    )
+    assert sold.kept_at_least(0.0017) is None
 
 
 def test_numbers_of_remedies_are_rounded_to_the_side_on_which_they_hold():
-    own = RodSizes({"rod.width": 0.05, "rod.height": 0.025})
-    assert own.at_least(0.01, 0.0121) == "rod.width = 0.061, rod.height = 0.031"
-    assert own.at_most(0.01, 0.0079) == "rod.width = 0.039, rod.height = 0.019"
+    own = RodSizes({"rod.width": 0.05, "rod.height": 0.025}, 0.01)
+    assert own.at_least(0.0121) == "rod.width = 0.061, rod.height = 0.031"
+    assert own.at_most(0.0079) == "rod.width = 0.039, rod.height = 0.019"
     assert allow("cable.force_max", 21.0) == "Allow cable.force_max = 21."
     assert allow("cable.force_max", 21.01) == "Allow cable.force_max = 22."
     assert allow("limits.uplift", 0.0) == "Allow limits.uplift = 0."

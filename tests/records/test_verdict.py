@@ -7,7 +7,8 @@ import pytest
 
 from shellform.cli.terminal import tell_designs
 from shellform.records.as_built import AsBuilt
-from shellform.records.checks import Bounds, checks
+from shellform.records.checks import checks
+from shellform.records.limited import Bounds
 from shellform.records.optimisation import CableCountRecord, SymmetryRecord
 from shellform.records.summary import StandingRecord
 from shellform.records.verdict import asked, failed, headline, to_build, verdict

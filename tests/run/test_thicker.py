@@ -94,7 +94,7 @@ def test_remedies_name_the_entries_that_the_case_has():
     assert "take another (rod.catalogue)" in rods.thinner(1e-3)
     lath = OwnRodEntry(young=10e9, strength=30e6, width=0.05, height=0.025)
     sizes = rod_sizes(lath, Rod(given_section(lath)))
-    assert "rod.width = 0.055, rod.height = 0.028" in RodsOf(0.02, 0.05, 1.0, sizes=sizes).stronger(1.2)
+    assert "rod.width = 0.055, rod.height = 0.028" in RodsOf(0.025, 0.05, 1.0, sizes=sizes).stronger(1.2)
     tube = OwnRodEntry(young=10e9, strength=30e6, radius=0.02, wall=0.002)
     sizes = rod_sizes(tube, Rod(given_section(tube)))
     assert "rod.radius = 0.018, rod.wall = 0.0018" in RodsOf(0.02, 0.05, 1.0, sizes=sizes).thinner(0.9)

@@ -87,7 +87,7 @@ def answers(
     stressed = (
         ""
         if main is None or not math.isfinite(shell.rod.strength)
-        else f"; at {100 * main.rod_utilisation_max:.0f} % of their strength"
+        else f"; at {100 * main.stressed:.0f} % of their strength"
     )
     locked = "" if layers_of(section) == 1 else "; bent lath by lath, then locked by shear blocks"
     found.append(
@@ -194,7 +194,7 @@ def _is_safe(
     main: LoadRecord | None, more: LoadRecord, as_built: Cell | None, strength_known: bool
 ) -> Answer:
     """Of the additional load: from the drawn structures, where the perfect one stands at all."""
-    used = more.rod_utilisation_max
+    used = more.stressed
     known = math.isfinite(used) and strength_known
     sure = ""
     safe: bool | None

@@ -114,6 +114,7 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         else {_COUNTED[name]: n for name, n in asdict(summary.model).items()},
         "source": "" if summary.surface is None else summary.surface.source,
         "optimisation": summary.optimisation,
+        "rejected": sum(not step.accepted for step in run.history),
         "seconds": dict(sorted(summary.seconds.items(), key=lambda each: each[0] == "total")),
         "profile": profile_table(run.profile),
         "rod": label(run.shell.rod.resized(run.designs[run.best].radius).section, 2),

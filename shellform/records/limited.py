@@ -1,0 +1,224 @@
+"""What an engineer limits, and constraint (5): each at its worst over a design's load cases, with what to do
+where it isn't kept.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from shellform.quantities import newtons
+from shellform.records.as_built import AsBuilt
+from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, quantity
+from shellform.records.remedies import RodSizes, RodsOf, allow, allow_less, rounded_up
+from shellform.records.summary import DesignRecord, LoadRecord
+from shellform.records.words import load_title
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
+    mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) the largest
+    `deviation`, m, under the design load, of the perfect structure and as `built`, and `unloaded`; `stress`
+    over strength, connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull
+    `slack`, N, of cables under the `slack_loads`, and by load the least `critical` factor; what is asked of
+    structures as built (`safety`); and how the case gives its `rods`' size."""
+
+    force: float
+    misfit: float
+    deviation: float | None = None
+    built: float | None = None
+    unloaded: float | None = None
+    stress: float | None = None
+    turn: float | None = None
+    uplift: float | None = None
+    thrust: float | None = None
+    slack: float | None = None
+    slack_loads: tuple[str, ...] = ()
+    critical: Mapping[str, float] = field(default_factory=dict)
+    safety: AsBuilt | None = None
+    rods: RodSizes | None = None
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What a design has of something that is limited: the `value`, in the unit of the case's entry, and the
+    `row` of the load under which it has it (None: of all loads)."""
+
+    value: float
+    row: LoadRecord | None
+
+
+def _allowed(limit: _Limit, found: _Found, rods: RodsOf) -> str:
+    return allow(limit.entry, found.value)
+
+
+def _less_stressed(limit: _Limit, found: _Found, rods: RodsOf) -> str:
+    """More than the strength is nothing to allow."""
+    if found.row is None or rounded_up(found.value) <= 1.0:
+        return allow(limit.entry, found.value)
+    return rods.less_stressed(found.row.rod_utilisation_max, found.value, min(limit.most or 1.0, 1.0))
+
+
+@dataclass(frozen=True)
+class _Limit:
+    """One that an engineer set, or (5): its `title`, the `most` of what is limited (None: not limited), in
+    the unit of the case's `entry`; what a design has of it (`found`, None: not known); the `unit` in which
+    people read it, so many of which (`times`) make one of the entry's; and the `remedy`."""
+
+    title: str
+    entry: str
+    most: float | None
+    found: Callable[[DesignRecord], _Found | None]
+    unit: str
+    times: float = 1.0
+    remedy: Callable[[_Limit, _Found, RodsOf], str] = _allowed
+
+
+def limited(rows: Mapping[str, DesignRecord], rods: Mapping[str, RodsOf], bounds: Bounds) -> list[Check]:
+    """Constraint (5), and what an engineer limits, each at its worst over the load cases: of the designs that
+    have the `rods`."""
+    limits = [
+        _Limit(
+            "Largest deviation under the design load",
+            "limits.deviation",
+            bounds.deviation,
+            lambda row: _under("design", row, _deviation),
+            "mm",
+            1e3,
+        ),
+        _Limit(
+            "Largest deviation as built under the design load",
+            "limits.built_deviation",
+            bounds.built,
+            lambda row: _under("design", row, _built_deviation),
+            "mm",
+            1e3,
+        ),
+        _Limit(
+            "Largest deviation before any load",
+            "limits.unloaded_deviation",
+            bounds.unloaded,
+            lambda row: _under("none", row, _deviation),
+            "mm",
+            1e3,
+        ),
+        _Limit(
+            "Rods' stress with axial force under any load",
+            "limits.utilisation",
+            bounds.stress,
+            lambda row: _worst(row.loads.values(), lambda load: load.stress_utilisation_max),
+            "% of the strength",
+            100.0,
+            _less_stressed,
+        ),
+        _Limit(
+            "Connectors' turning under any load",
+            "limits.connector_turn",
+            bounds.turn,
+            lambda row: _worst(row.loads.values(), lambda load: load.connector_turn_max),
+            "°",
+            180.0 / math.pi,
+        ),
+        _Limit(
+            "Uplift of a support under any load",
+            "limits.uplift",
+            bounds.uplift,
+            lambda row: _worst(row.loads.values(), lambda load: load.uplift_max),
+            "N",
+        ),
+        _Limit(
+            "Thrust on a support under any load",
+            "limits.thrust",
+            bounds.thrust,
+            lambda row: _worst(row.loads.values(), lambda load: load.thrust_max),
+            "N",
+        ),
+    ]
+    pulled = _Limit(
+        "Largest cable force under the design load and those beyond it (5)",
+        "cable.force_max",
+        bounds.force,
+        _pull,
+        "N",
+    )
+    designs = list(rods)
+    found = [
+        _at_most(pulled, bounds.force, rows, rods),
+        *_pulled_before(rows, designs, bounds.force),
+        *(_at_most(each, each.most, rows, rods) for each in limits if each.most is not None),
+    ]
+    if bounds.slack is not None:
+        found += [_taut(rows, designs, load, bounds.slack) for load in bounds.slack_loads]
+    return found
+
+
+def _pulled_before(rows: Mapping[str, DesignRecord], designs: Sequence[str], force: float) -> list[Check]:
+    """The largest cable force before any load, which is told and not asked for, where it is known; `force`,
+    N: the limit under load."""
+    pulls = {name: row.loads["none"].cable_force_max for name, row in rows.items() if "none" in row.loads}
+    told = {name: Cell(newtons(pull), None, False) for name, pull in pulls.items() if pull is not None}
+    cells = {name: told.get(name, UNASKED) for name in designs}
+    limit = f"told; the limit, {newtons(force)}, counts under load"
+    return [Check("Largest cable force before any load", limit, cells)] if told else []
+
+
+def _at_most(
+    limit: _Limit, most: float, rows: Mapping[str, DesignRecord], rods: Mapping[str, RodsOf]
+) -> Check:
+    cells = {}
+    for name, own in rods.items():
+        found = limit.found(rows[name]) if name in rows else None
+        if found is None or not math.isfinite(found.value):
+            cells[name] = UNKNOWN
+            continue
+        # what a shape that has collapsed has of it says nothing of the one that stands
+        remedy = "" if found.row is not None and found.row.collapsed else limit.remedy(limit, found, own)
+        cells[name] = below(limit.times * found.value, limit.times * most, limit.unit, remedy)
+    return Check(limit.title, quantity(limit.times * most, limit.unit), cells)
+
+
+def _worst(rows: Iterable[LoadRecord], value: Callable[[LoadRecord], float | None]) -> _Found | None:
+    """The largest of the values that are known."""
+    known = [(found, row) for row in rows if (found := value(row)) is not None]
+    return _Found(*max(known, key=lambda each: each[0])) if known else None
+
+
+def _under(load: str, row: DesignRecord, value: Callable[[LoadRecord], float | None]) -> _Found | None:
+    """The value under the one load."""
+    return _worst([row.loads[load]] if load in row.loads else [], value)
+
+
+def _pull(row: DesignRecord) -> _Found | None:
+    """Of the cables, N, under every load but none; the design's own where that isn't known."""
+    loaded = [each for load, each in row.loads.items() if load != "none"]
+    found = _worst(loaded, lambda load: load.cable_force_max)
+    return found if found is not None and found.value else _Found(row.cable_force_max, None)
+
+
+def _deviation(row: LoadRecord) -> float:
+    """The largest, m, on the mesh on which it is larger: q8 = q4 - 3/4 of the error of q4."""
+    return max(row.deviation_max, row.deviation_max - 0.75 * (row.deviation_max_error or 0.0))
+
+
+def _built_deviation(row: LoadRecord) -> float | None:
+    """The worst, m, of the drawn structures that were looked at; of one that fell before there is none."""
+    return None if row.built_shape is None else row.built_shape.deviation_max_worst
+
+
+def _taut(rows: Mapping[str, DesignRecord], designs: Sequence[str], load: str, least: float) -> Check:
+    """The least pull of a cable."""
+    cells = {}
+    for name in designs:
+        row = rows[name].loads.get(load) if name in rows else None
+        pull = None if row is None else row.cable_force_min
+        remedy = (
+            allow_less("limits.slack_min", pull) if pull else "Leave limits.slack_min out, or let it be 0.01."
+        )
+        if row is not None and row.collapsed:
+            remedy = ""
+        cells[name] = (
+            UNKNOWN if pull is None else Cell(newtons(pull), pull >= least * (1.0 - SLACK), remedy=remedy)
+        )
+    return Check(f"Least pull of a cable under {load_title(load)}", f"at least {newtons(least)}", cells)
