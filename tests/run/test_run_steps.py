@@ -1,6 +1,7 @@
 """Single steps of a run, without running it: what is outdated, when a design deforms too much, and what keys
 depend on."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -207,6 +208,21 @@ def test_the_designs_of_a_sketch_are_no_others(tmp_path):
     assert changed(tmp_path, sketch=True) == "initial"
     (tmp_path / "shell.obj").write_text("v 0 0 0\n", encoding="utf-8")
     assert changed(tmp_path, sketch=True) == "initial"
+
+
+def test_a_surface_is_another_where_a_buffer_beside_its_scene_is_and_may_lie_anywhere(tmp_path):
+    """Its buffers: one in the file, one beside it, and one that isn't there."""
+    uris = ["data:application/octet-stream;base64,AAAA", "dome.bin", "x" * 300]
+    scene = json.dumps({"buffers": [{"uri": uri, "byteLength": 3} for uri in uris]})
+    found = []
+    for place, content in (("one", b"abc"), ("two", b"abc"), ("two", b"abcd")):
+        (tmp_path / place).mkdir(exist_ok=True)
+        (tmp_path / place / "shell.gltf").write_text(scene, encoding="utf-8")
+        (tmp_path / place / "dome.bin").write_bytes(content)
+        case = make_case({**CASE, "surface": {"file": f"{place}/shell.gltf"}}, tmp_path / "case.toml")
+        found.append(stage_keys(case))
+    assert found[0] == found[1]
+    assert all(found[1][stage] != found[2][stage] for stage in STAGES)
 
 
 def test_designs_depend_on_what_stands_in_the_case_s_own_catalogue(tmp_path):
