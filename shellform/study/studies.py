@@ -38,7 +38,7 @@ from shellform.study.jobs import Job, disk_is_full, work
 from shellform.study.outcome import ListedDesign, Outcome, Row, Status, Value
 from shellform.study.page_of_study import write_study_page
 from shellform.study.plan import Plan, changes, length, read_study, resolved
-from shellform.study.store import Log, arrow, designs_of, line_of, picked, write_table
+from shellform.study.store import Log, arrow, cell_of, designs_of, line_of, picked, write_table
 from shellform.written import make_folder, write_text
 
 WRITTEN = (
@@ -241,7 +241,7 @@ def _identify(study: _Studying, own: Mapping[str, Value]) -> _Design:
         keys = stage_keys(case)
     except InputError as error:
         digest = hashlib.sha256(
-            f"{shellform.__version__} refused {json.dumps(dict(values))} {error}".encode()
+            f"{shellform.__version__} refused {json.dumps(dict(values), default=cell_of)} {error}".encode()
         )
         return _Design(digest.hexdigest()[:_SHORT], values, None, {}, str(error))
     until = study.plan.study.until

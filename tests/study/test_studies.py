@@ -512,6 +512,25 @@ def test_a_study_s_folder_may_hold_its_study_file_and_other_files_and_what_is_le
     assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
 
 
+def test_lists_and_dates_of_designs_stand_in_the_table_as_text(tmp_path, on_two):
+    text = """
+        [[designs]]
+        title_block.date = 2026-05-31
+        net.offset = [0.1, 0.25]
+        [[designs]]
+        title_block.date = 2026-05-31
+        net.spacing = -1.0
+        [[designs]]
+        net.spacing = 0.1
+    """
+    assert run_study(study_file(tmp_path, text), tmp_path / "out", work=quick).failed == 1
+    told = rows(tmp_path / "out")
+    assert [row["status"] for row in told] == ["done", "refused", "done"]
+    assert [row["case.title_block.date"] for row in told] == ["2026-05-31", "2026-05-31", ""]
+    assert [row["case.net.offset"] for row in told] == ["[0.1, 0.25]", "", ""]
+    assert read_table(tmp_path / "out")["case.net.offset"].to_pylist() == ["[0.1, 0.25]", None, None]
+
+
 def test_columns_that_no_summary_has_are_named(tmp_path, on_two):
     text = (
         "[vary]\nnet.spacing = [0.10, 0.12]\n[column]\n"
