@@ -28,12 +28,16 @@ _NEEDS = {
 
 
 def stage_keys(case: Case, *, sketch: bool = False) -> dict[str, str]:
-    """A hash for each stage of all that it depends on; of the surface file that is its name and content,
-    wherever it lies, with that of the buffers beside it. The designs of a `sketch` are no others'.
+    """A hash for each stage of all that it depends on; of the surface file that is its name and content, with
+    that of the buffers beside it, and of the case's own catalogues the same, wherever they lie. The designs
+    of a `sketch` are no others'.
     """
     entries = case.model_dump(mode="json")
     file = Path(case.surface.file)
     entries["surface"]["file"] = file.name
+    for entry in (entries["rod"], entries["optimise"], entries["edges"]["beam"]):
+        if Path(entry.get("catalogue") or "").is_absolute():  # one of the case's own, wherever it lies
+            entry["catalogue"] = Path(entry["catalogue"]).name
     stock = catalogue_bytes(case)
     entries["stock"] = {
         name: entries["rod"].pop(name) for name in ("stock_length", "kerf")

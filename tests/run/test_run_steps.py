@@ -236,3 +236,27 @@ def test_designs_depend_on_what_stands_in_the_case_s_own_catalogue(tmp_path):
         found.append(stage_keys(make_case(tables, tmp_path / "case.toml")))
     one, other = found
     assert [stage for stage in STAGES if one[stage] == other[stage]] == ["surface", "net"]
+
+
+def test_the_case_s_own_catalogues_are_the_same_wherever_they_lie(tmp_path):
+    """The rods', the one that is rounded to and the edge beams'."""
+    shipped = Path(read_catalogue.__code__.co_filename).parent.parent / "catalogues/gfrp_rods.toml"
+    tables = {
+        **CASE,
+        "rod": {"catalogue": "ours.toml", "section": "8 mm"},
+        "optimise": {
+            **CASE["optimise"],
+            "catalogue": "ours.toml",
+            "misfit": 0.6,
+            "cable_force": 0.3,
+            "rod_radius": 0.1,
+        },
+        "edges": {"beam": {"catalogue": "ours.toml", "section": "12 mm"}},
+    }
+    found = []
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "shell.obj").touch()
+        (tmp_path / name / "ours.toml").write_bytes(shipped.read_bytes())
+        found.append(stage_keys(make_case(tables, tmp_path / name / "case.toml")))
+    assert found[0] == found[1]
