@@ -165,7 +165,7 @@ def read_toml(file: Path) -> dict[str, Any]:
 def make_case(data: Mapping[str, Any], file: Path) -> Case:
     """As `load_case`, from the tables of a file that are read already."""
     try:
-        case = Case.model_validate(_with_joint(with_present_names(data), file))
+        case = Case.model_validate(with_joint(with_present_names(data), file))
     except ValidationError as error:
         raise refusal(error, Case, str(file), follows={"joint": "rod"}) from error
     name = case.surface.file
@@ -199,9 +199,9 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
     return case.model_copy(update=found)
 
 
-def _with_joint(data: Mapping[str, Any], file: Path) -> Mapping[str, Any]:
-    """The tables with what [joint] leaves out as fits the rods. Raises InputError where their size isn't
-    given."""
+def with_joint(data: Mapping[str, Any], file: Path) -> Mapping[str, Any]:
+    """The tables of a case file with what [joint] leaves out as fits the rods; as they are where these are
+    refused. Raises InputError where their size isn't given."""
     given = data.get("joint", {})
     missing = [name for name in JointEntry.model_fields if isinstance(given, Mapping) and name not in given]
     if not missing:

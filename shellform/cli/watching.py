@@ -54,11 +54,12 @@ def watched(
 
 
 def case_files(case: Path, settings: Sequence[str]) -> list[Path]:
-    """The case's file, and its surface's where the case can be read."""
+    """The case's file and, where the case can be read, those of its surface."""
     from shellform.case.case import load_case
+    from shellform.surface.readers.gltf import surface_files
 
     try:
-        return [case, Path(load_case(case, settings).surface.file)]
+        return [case, *surface_files(Path(load_case(case, settings).surface.file))]
     except InputError:  # which `once` tells
         return [case]
 

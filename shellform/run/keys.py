@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from functools import cache
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from shellform.case.build_gridshell import catalogue_bytes, has_edge_cells
 from shellform.case.build_safety import SEARCHED
 from shellform.case.case import Case
 from shellform.records.stages import STAGES
+from shellform.surface.readers.gltf import surface_files
 
 _NEEDS = {
     "surface": ["surface"],
@@ -26,12 +28,16 @@ _NEEDS = {
 
 
 def stage_keys(case: Case, *, sketch: bool = False) -> dict[str, str]:
-    """A hash for each stage of all that it depends on; of the surface file that is its name and content,
-    wherever it lies. The designs of a `sketch` are no others'.
+    """A hash for each stage of all that it depends on; of the surface file that is its name and content, with
+    that of the buffers beside it, and of the case's own catalogues the same, wherever they lie. The designs
+    of a `sketch` are no others'.
     """
     entries = case.model_dump(mode="json")
     file = Path(case.surface.file)
     entries["surface"]["file"] = file.name
+    for entry in (entries["rod"], entries["optimise"], entries["edges"]["beam"]):
+        if Path(entry.get("catalogue") or "").is_absolute():  # one of the case's own, wherever it lies
+            entry["catalogue"] = Path(entry["catalogue"]).name
     stock = catalogue_bytes(case)
     entries["stock"] = {
         name: entries["rod"].pop(name) for name in ("stock_length", "kerf")
@@ -44,10 +50,7 @@ def stage_keys(case: Case, *, sketch: bool = False) -> dict[str, str]:
     }  # on which no search depends, but for how many it draws itself
     entries["told"] = told | {"built_deviation": entries["limits"].pop("built_deviation")}
     entries["safety"] |= {"searched": min(told["drawn"], SEARCHED)}
-    status = file.stat()
-    digest = hashlib.sha256(
-        shellform.__version__.encode() + _content(str(file), status.st_size, status.st_mtime_ns)
-    )
+    digest = hashlib.sha256(shellform.__version__.encode() + _surface_content(file))
     keys = {}
     for stage in STAGES:
         digest.update(stock if stage == "initial" else b"")
@@ -57,7 +60,18 @@ def stage_keys(case: Case, *, sketch: bool = False) -> dict[str, str]:
     return keys
 
 
+def _surface_content(file: Path) -> bytes:
+    """Hashes of what a surface is read from; what is named and isn't there has none: its reader says so."""
+    found = b""
+    for each in surface_files(file):
+        if each == file or os.path.isfile(each):  # Path.is_file raises for names that no file can have
+            status = each.stat()
+            found += _content(str(each), status.st_size, status.st_mtime_ns)
+    return found
+
+
 @cache
 def _content(file: str, size: int, written: int) -> bytes:
     """A hash of a file as it was when it had this size and time: studies ask for the same ones many times."""
-    return hashlib.sha256(Path(file).read_bytes()).digest()
+    with open(file, "rb") as content:
+        return hashlib.file_digest(content, "sha256").digest()

@@ -268,9 +268,12 @@ def _surface(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
 
 
 def _net(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
-    if keep:
-        return _Ended(replace(parts, net=load_net(workspace.path("net.npz"))), summary)
-    case, surface = workspace.case, _there(parts.surface)
+    case = workspace.case
+    if keep:  # which is the same with other rods; what it allows of them isn't
+        net = load_net(workspace.path("net.npz"))
+        record = with_rods(_there(summary.net), rod_limits(case.rod, net))
+        return _Ended(replace(parts, net=net), replace(summary, net=record))
+    surface = _there(parts.surface)
 
     def pulled(target: Surface) -> tuple[Net, float, tuple[float, float]]:
         return net_of(case, target, progress=lambda text: workspace.say("net", text))

@@ -33,10 +33,11 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from shellform.case.case import Case, make_case, read_toml, set_entry
+from shellform.case.case import Case, make_case, read_toml, set_entry, with_joint
 from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError
 from shellform.study.expressions import evaluate
+from shellform.study.files_below import inside, matching
 from shellform.study.outcome import OWN_COLUMNS, Value
 
 _MOST = 1_000_000  # designs
@@ -193,17 +194,17 @@ def read_study(path: str | Path) -> Plan:
 
 def make_plan(study: Study, file: Path) -> Plan:
     """The plan of a study's entries; paths are relative to `file`."""
-    case = _inside(file, study.case, "case")
+    case = inside(file, study.case, "case")
     tables = read_toml(case)
     base = make_case(tables, case).model_dump(mode="json")
     lists: dict[str, Sequence[Value]] = {}
     ranges: dict[str, Unit] = {}
     for name, entry in study.vary.items():
         if entry.files is not None:
-            lists[name] = _files(file, entry.files, f"vary.{name}.files")
+            lists[name] = matching(file, entry.files, f"vary.{name}.files")
         elif entry.values is not None:
             lists[name] = [
-                str(_inside(file, str(each), f"vary.{name}")) if name == "surface.file" else each
+                str(inside(file, str(each), f"vary.{name}")) if name == "surface.file" else each
                 for each in entry.values
             ]
         elif study.method == "grid":
@@ -289,7 +290,7 @@ def resolved(plan: Plan, own: Mapping[str, Value]) -> tuple[Case, dict[str, Valu
 
     Raises InputError where the case is refused.
     """
-    study = plan.study
+    study, case = plan.study, plan.file.parent / plan.study.case
     given: dict[str, Any] = {**study.set, **own}
     found: dict[str, float] = {}
     asked: list[str] = []
@@ -312,7 +313,7 @@ def resolved(plan: Plan, own: Mapping[str, Value]) -> tuple[Case, dict[str, Valu
                 else evaluate(text, f"{plan.file}: function.{name}", entry)
             )
             return found[name]
-        value = given[name] if name in given else _value_of(plan.base, name)
+        value = given[name] if name in given else followed(name)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise InputError(
                 "is no number of the case",
@@ -322,11 +323,29 @@ def resolved(plan: Plan, own: Mapping[str, Value]) -> tuple[Case, dict[str, Valu
             )
         return float(value)
 
+    def followed(name: str) -> Any:
+        """An entry as the base case has it; of a joint that it leaves out, as fits this design's rods."""
+        value = _value_of(plan.base, name)
+        if value is None or not name.startswith("joint.") or _value_of(plan.tables, name) is not None:
+            return value
+        rods = {each: value for each, value in given.items() if each.startswith("rod.")}
+        follow = [each for each in study.function if each.startswith("rod.")]
+        tables = _tables(plan, rods | {each: _as_the_base(plan, each, entry(each)) for each in follow})
+        fitting = _value_of(with_joint(tables, case), name)
+        if fitting is None:
+            make_case(tables, case)  # says what is wrong with the rods
+        return fitting
+
     follow = {name: _as_the_base(plan, name, entry(name)) for name in study.function}
+    return make_case(_tables(plan, {**given, **follow}), case), {**own, **follow}
+
+
+def _tables(plan: Plan, entries: Mapping[str, Value]) -> dict[str, Any]:
+    """The base case's tables with entries in place of its own."""
     tables = copy.deepcopy(dict(plan.tables))
-    for name, value in {**given, **follow}.items():
+    for name, value in entries.items():
         set_entry(tables, name, value, where=f"{plan.file}: {name}")
-    return make_case(tables, plan.file.parent / study.case), {**own, **follow}
+    return tables
 
 
 def _as_the_base(plan: Plan, name: str, value: float) -> Value:
@@ -352,46 +371,4 @@ def _flat(value: Any, leaves: Any, prefix: str = "") -> Any:
             found |= _flat(each, leaves, f"{prefix}{key}.")
         else:
             found[f"{prefix}{key}"] = each
-    return found
-
-
-def _inside(file: Path, name: str, where: str) -> Path:
-    """A path in the study file, which may not lead out of its folder."""
-    root = file.parent.resolve()
-    place = (root / name).resolve()
-    if root != place and root not in place.parents:
-        raise InputError(
-            "leads out of the study file's folder",
-            where=f"{file}: {where}",
-            value=name,
-            remedy="Put the study file beside or above it.",
-        )
-    return place
-
-
-def _files(file: Path, pattern: str, where: str) -> list[str]:
-    root = file.parent.resolve()
-    if Path(pattern).is_absolute() or ".." in Path(pattern).parts or not pattern.strip():
-        raise InputError(
-            "leads out of the study file's folder",
-            where=f"{file}: {where}",
-            value=pattern,
-            remedy="Put the study file beside or above them.",
-        )
-    try:
-        found = sorted(str(_inside(file, str(each), where)) for each in root.glob(pattern) if each.is_file())
-    except (ValueError, NotImplementedError, OSError) as error:
-        raise InputError(
-            f"is no pattern: {error}",
-            where=f"{file}: {where}",
-            value=pattern,
-            remedy="For example shells/*.obj.",
-        ) from error
-    if not found:
-        raise InputError(
-            "there is no such file",
-            where=f"{file}: {where}",
-            value=pattern,
-            remedy="Name a file below the study file's folder.",
-        )
     return found

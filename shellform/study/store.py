@@ -13,10 +13,12 @@ of its lines, so that a study that was stopped ends with the same bytes as one t
 
 from __future__ import annotations
 
+import datetime
 import json
 import os
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -171,8 +173,20 @@ def picked(values: Mapping[str, Value], columns: Mapping[str, str]) -> dict[str,
 
 
 def line_of(design: ListedDesign) -> str:
-    """A design as a line of designs.jsonl."""
-    return json.dumps(plain(design)) + "\n"
+    """A design as a line of designs.jsonl: lists as their JSON, dates and times as ISO 8601 has them, since a
+    cell of a table holds one value.
+    """
+    own = {name: cell_of(value) for name, value in design.own.items()}
+    return json.dumps(plain(replace(design, own=own))) + "\n"
+
+
+def cell_of(value: Any) -> Value:
+    """What a cell has of an entry's value."""
+    if isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, datetime.date | datetime.time):
+        return value.isoformat()
+    return json.dumps(value, default=cell_of)
 
 
 def arrow() -> tuple[Any, Any]:

@@ -38,12 +38,13 @@ from shellform.study.jobs import Job, disk_is_full, work
 from shellform.study.outcome import ListedDesign, Outcome, Row, Status, Value
 from shellform.study.page_of_study import write_study_page
 from shellform.study.plan import Plan, changes, length, read_study, resolved
-from shellform.study.store import Log, arrow, designs_of, line_of, picked, write_table
+from shellform.study.store import Log, arrow, cell_of, designs_of, line_of, picked, write_table
 from shellform.written import make_folder, write_text
 
 WRITTEN = (
     "study.toml", "designs.jsonl", "results.jsonl", "table.parquet", "table.csv", "seconds.csv", "runs", "stages", "study.html",
 )  # fmt: skip
+_FIRST = ("results.jsonl", "designs.jsonl")  # which a study writes before all others
 _SHARE_OF_TIME = 0.02  # that is spent on bringing the table up to date while the study runs
 _LATEST = 12  # rows shown
 _SHORT = 32  # hexadecimal digits of a key: 128 bits
@@ -124,8 +125,8 @@ def run_study(
 
     `workers` processes on this machine, or those of a Dask `scheduler`, which have to see the folder by the
     same name. Dask's `dashboard` is open to everybody on this machine. `show` is called with the progress.
-    Raises InputError for a bad study, NotConverged where the disk is full, no worker is there for 5 minutes
-    (of a `scheduler`: an hour), or no design has a result.
+    Raises InputError for a bad study and a folder with others' files, NotConverged where the disk is full, no
+    worker is there for 5 minutes (of a `scheduler`: an hour), or no design has a result.
     """
     plan = read_study(file)
     arrow()  # before hours are spent on designs
@@ -135,6 +136,7 @@ def run_study(
             raise InputError(
                 "is a symbolic link, which isn't followed", where=str(place / part), remedy="Delete it."
             )
+    _refuse_overwriting(place, Path(file))
     try:
         with alone(place), Log(place / "results.jsonl") as log:
             for part in ("runs", "stages"):
@@ -149,6 +151,21 @@ def run_study(
         raise NotConverged(
             f"{what}: {error}", remedy="Run the same command again: it goes on from here."
         ) from error
+
+
+def _refuse_overwriting(place: Path, file: Path) -> None:
+    """Raises InputError for a folder in which files that no study wrote would be overwritten or dropped; the
+    study's own `file` may stand in it.
+    """
+    if any((place / name).is_file() for name in _FIRST):
+        return
+    there = [name for name in WRITTEN if (place / name).exists() and not (place / name).samefile(file)]
+    if there:
+        raise InputError(
+            f"is no study's folder, and {', '.join(there)} in it would be overwritten",
+            where=str(place),
+            remedy="Choose another --output.",
+        )
 
 
 def _go(study: _Studying, work: Work, begin: Callable[[], AbstractContextManager[Engine]]) -> None:
@@ -224,7 +241,7 @@ def _identify(study: _Studying, own: Mapping[str, Value]) -> _Design:
         keys = stage_keys(case)
     except InputError as error:
         digest = hashlib.sha256(
-            f"{shellform.__version__} refused {json.dumps(dict(values))} {error}".encode()
+            f"{shellform.__version__} refused {json.dumps(dict(values), default=cell_of)} {error}".encode()
         )
         return _Design(digest.hexdigest()[:_SHORT], values, None, {}, str(error))
     until = study.plan.study.until

@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from shellform.cli.watching import watched
+from shellform.cli.watching import case_files, watched
 from shellform.errors import InputError
 from shellform.records.progress import Event
 from tests.command import ROOT, begin, shellform
@@ -100,6 +100,15 @@ def test_an_error_of_an_overtaken_run_is_not_told_and_one_of_ours_is_raised(tmp_
     with pytest.raises(ZeroDivisionError):
         watched(lambda: [file], once)
     assert "can't be read" not in capsys.readouterr().err
+
+
+def test_the_buffers_of_a_scene_are_watched_with_it_also_before_they_are_there(tmp_path):
+    case, scene = tmp_path / "case.toml", tmp_path / "dome.gltf"
+    case.write_text(CASE.replace(str(ROOT / "surfaces/dome.py"), "dome.gltf"), encoding="utf-8")
+    assert case_files(case, []) == [case, scene]
+    scene.write_text('{"buffers": [{"uri": "dome.bin", "byteLength": 3}]}', encoding="utf-8")
+    assert case_files(case, []) == [case, scene, tmp_path / "dome.bin"]
+    assert case_files(case, ["net.spacing=-1"]) == [case]
 
 
 def test_what_is_wrong_from_the_outset_is_refused(tmp_path):

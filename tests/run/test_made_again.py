@@ -61,6 +61,22 @@ def test_a_design_that_is_not_asked_for_again_is_gone_with_all_its_pictures(file
     assert (tmp_path / "figures/initial-design.png").is_file()
 
 
+def test_a_net_that_is_kept_is_told_with_the_rods_of_the_case_as_it_is(file, tmp_path):
+    """Its joint is given, so that nothing of the net depends on the rods."""
+    weak = "rod.strength=100e6"
+    run_case(load_case(file), tmp_path / "again", until="net")
+    before = (tmp_path / "again/net.npz").stat().st_mtime_ns
+    told = run_case(load_case(file, [weak]), tmp_path / "again", until="net").net
+    assert (tmp_path / "again/net.npz").stat().st_mtime_ns == before
+    alone = run_case(load_case(file, [weak]), tmp_path / "alone", until="net").net
+    for name in ("rod_radius_max", "curvature_limit", "curvature_utilisation"):
+        assert getattr(told, name) == getattr(alone, name) != 0.0
+    assert (
+        json.loads((tmp_path / "again/summary.json").read_text(encoding="utf-8"))["net"]
+        == json.loads((tmp_path / "alone/summary.json").read_text(encoding="utf-8"))["net"]
+    )
+
+
 def test_wishes_for_cables_are_kept_and_told_in_summary_schedule_and_page(file, tmp_path, undrawn):
     most = 80
     wishes = [f"optimise.cables_max={most}", "optimise.symmetric=true", "optimise.polish=2"]

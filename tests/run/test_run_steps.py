@@ -1,6 +1,7 @@
 """Single steps of a run, without running it: what is outdated, when a design deforms too much, and what keys
 depend on."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -209,6 +210,21 @@ def test_the_designs_of_a_sketch_are_no_others(tmp_path):
     assert changed(tmp_path, sketch=True) == "initial"
 
 
+def test_a_surface_is_another_where_a_buffer_beside_its_scene_is_and_may_lie_anywhere(tmp_path):
+    """Its buffers: one in the file, one beside it, and one that isn't there."""
+    uris = ["data:application/octet-stream;base64,AAAA", "dome.bin", "x" * 300]
+    scene = json.dumps({"buffers": [{"uri": uri, "byteLength": 3} for uri in uris]})
+    found = []
+    for place, content in (("one", b"abc"), ("two", b"abc"), ("two", b"abcd")):
+        (tmp_path / place).mkdir(exist_ok=True)
+        (tmp_path / place / "shell.gltf").write_text(scene, encoding="utf-8")
+        (tmp_path / place / "dome.bin").write_bytes(content)
+        case = make_case({**CASE, "surface": {"file": f"{place}/shell.gltf"}}, tmp_path / "case.toml")
+        found.append(stage_keys(case))
+    assert found[0] == found[1]
+    assert all(found[1][stage] != found[2][stage] for stage in STAGES)
+
+
 def test_designs_depend_on_what_stands_in_the_case_s_own_catalogue(tmp_path):
     (tmp_path / "shell.obj").touch()
     shipped = Path(read_catalogue.__code__.co_filename).parent.parent / "catalogues/gfrp_rods.toml"
@@ -220,3 +236,27 @@ def test_designs_depend_on_what_stands_in_the_case_s_own_catalogue(tmp_path):
         found.append(stage_keys(make_case(tables, tmp_path / "case.toml")))
     one, other = found
     assert [stage for stage in STAGES if one[stage] == other[stage]] == ["surface", "net"]
+
+
+def test_the_case_s_own_catalogues_are_the_same_wherever_they_lie(tmp_path):
+    """The rods', the one that is rounded to and the edge beams'."""
+    shipped = Path(read_catalogue.__code__.co_filename).parent.parent / "catalogues/gfrp_rods.toml"
+    tables = {
+        **CASE,
+        "rod": {"catalogue": "ours.toml", "section": "8 mm"},
+        "optimise": {
+            **CASE["optimise"],
+            "catalogue": "ours.toml",
+            "misfit": 0.6,
+            "cable_force": 0.3,
+            "rod_radius": 0.1,
+        },
+        "edges": {"beam": {"catalogue": "ours.toml", "section": "12 mm"}},
+    }
+    found = []
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "shell.obj").touch()
+        (tmp_path / name / "ours.toml").write_bytes(shipped.read_bytes())
+        found.append(stage_keys(make_case(tables, tmp_path / name / "case.toml")))
+    assert found[0] == found[1]

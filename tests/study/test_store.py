@@ -1,6 +1,7 @@
 """Which columns a study's table has, of which kind, and what stands in them."""
 
 import csv
+import datetime
 
 import pytest
 
@@ -146,3 +147,21 @@ def test_a_column_of_the_best_design_holds_what_any_of_its_designs_may_have(kind
     own = {BEST.replace(".best.", f".{name}."): each for name, each in kinds.items()}
     assert store._kind_of_pick(BEST, own) == kind
     assert store._kind_of_pick("net.spacing", {**own, "net.spacing": 1}) == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "cell"),
+    [
+        (True, True),
+        (3, 3),
+        (0.1, 0.1),
+        ("a, b", "a, b"),
+        ([0.1, [True, "b"]], '[0.1, [true, "b"]]'),
+        (datetime.date(2026, 5, 31), "2026-05-31"),
+        (datetime.time(7, 30), "07:30:00"),
+        ([datetime.datetime(2026, 5, 31, 7, 30)], '["2026-05-31T07:30:00"]'),
+    ],
+)
+def test_a_cell_has_plain_values_as_they_are_and_others_as_text(value, cell):
+    assert store.cell_of(value) == cell
+    assert type(store.cell_of(value)) is type(cell)

@@ -487,6 +487,50 @@ def test_links_in_a_study_s_folder_are_not_followed(tmp_path, on_two):
     assert (tmp_path / "mine.txt").read_text() == "mine"
 
 
+@pytest.mark.parametrize("name", ["study.toml", "table.csv", "stages/mine.txt", "runs/mine/plan.pdf"])
+def test_files_that_no_study_wrote_are_not_overwritten(tmp_path, on_two, name):
+    own = tmp_path / "out" / name
+    own.parent.mkdir(parents=True)
+    own.write_text("mine", encoding="utf-8")
+    file = study_file(tmp_path, GRID + "[limit]\nmisfit = 0.0\n")
+    with pytest.raises(
+        InputError, match=rf"is no study's folder, and {name.split('/')[0]} in it would be overwritten"
+    ):
+        run_study(file, tmp_path / "out", work=quick)
+    assert [each for each in (tmp_path / "out").rglob("*") if each.is_file()] == [own]
+    assert own.read_text(encoding="utf-8") == "mine"
+
+
+def test_a_study_s_folder_may_hold_its_study_file_and_other_files_and_what_is_left_of_it(tmp_path, on_two):
+    file = study_file(tmp_path, GRID)
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
+    run_study(file, tmp_path, work=quick)
+    (tmp_path / "results.jsonl").unlink()
+    assert run_study(file, tmp_path, work=quick).found == 0
+    (tmp_path / "designs.jsonl").unlink()
+    assert run_study(file, tmp_path, work=quick).found == 12
+    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
+
+
+def test_lists_and_dates_of_designs_stand_in_the_table_as_text(tmp_path, on_two):
+    text = """
+        [[designs]]
+        title_block.date = 2026-05-31
+        net.offset = [0.1, 0.25]
+        [[designs]]
+        title_block.date = 2026-05-31
+        net.spacing = -1.0
+        [[designs]]
+        net.spacing = 0.1
+    """
+    assert run_study(study_file(tmp_path, text), tmp_path / "out", work=quick).failed == 1
+    told = rows(tmp_path / "out")
+    assert [row["status"] for row in told] == ["done", "refused", "done"]
+    assert [row["case.title_block.date"] for row in told] == ["2026-05-31", "2026-05-31", ""]
+    assert [row["case.net.offset"] for row in told] == ["[0.1, 0.25]", "", ""]
+    assert read_table(tmp_path / "out")["case.net.offset"].to_pylist() == ["[0.1, 0.25]", None, None]
+
+
 def test_columns_that_no_summary_has_are_named(tmp_path, on_two):
     text = (
         "[vary]\nnet.spacing = [0.10, 0.12]\n[column]\n"

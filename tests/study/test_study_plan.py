@@ -10,7 +10,7 @@ from shellform.study import plan as plans
 from shellform.study.expressions import evaluate
 from shellform.study.outcome import OWN_COLUMNS
 from shellform.study.plan import Study, VaryEntry, changes, length, placed, ranged, read_study, resolved
-from tests.stubs import study_file
+from tests.stubs import CASE, study_file
 
 ENTRIES = {"net.spacing": 0.055, "rod.radius": 1e-3}
 
@@ -294,6 +294,38 @@ def test_entries_follow_from_the_case_s_own_and_whole_ones_stay_whole(tmp_path):
         ("cable.force_max", float),
         ("cable.stiffness", float),
     ]
+
+
+JOINT = CASE[CASE.index("[joint]") : CASE.index("[cable]")]
+
+
+def test_what_follows_from_a_joint_that_follows_the_rods_follows_each_design_s_own(tmp_path):
+    """A joint's gap is twice the rods' radius; its stiffnesses grow with the fourth power of it."""
+    own = "[vary]\nrod.radius = [0.001, 0.002]\n[function]\ncable.stiffness = '1e6 * joint.gap + 1e4 * joint.torsion'"
+    made = '[vary]\nnet.spacing = [0.1, 0.2]\n[function]\nrod.radius = "net.spacing / 100"\ncable.stiffness = "1e6 * joint.gap"'
+    for text in (own, made):
+        file = study_file(tmp_path, text)
+        file.with_name("dome.toml").write_text(CASE.replace(JOINT, ""), encoding="utf-8")
+        plan = read_study(file)
+        cases = [resolved(plan, each)[0] for each in changes(plan)]
+        assert [case.joint.gap for case in cases] == pytest.approx([0.002, 0.004])
+        for case in cases:
+            joint = case.joint
+            said = 1e6 * joint.gap + (1e4 * joint.torsion if text is own else 0.0)
+            assert case.cable.stiffness == pytest.approx(said, rel=1e-12)
+    given = JOINT.replace("gap = 0.002\n", "")
+    file.with_name("dome.toml").write_text(CASE.replace(JOINT, given), encoding="utf-8")
+    file.write_text('case = "dome.toml"\n' + own, encoding="utf-8")
+    plan = read_study(file)
+    found = [resolved(plan, each)[0].cable.stiffness for each in changes(plan)]
+    assert found == pytest.approx([2000.0 + 7.38, 4000.0 + 7.38]), "the torsion is the case's own"
+
+
+def test_rods_that_are_refused_are_told_where_something_follows_from_their_joint(tmp_path):
+    file = study_file(tmp_path, "[set]\nrod.radius = -1\n[function]\ncable.stiffness = 'joint.gap'")
+    file.with_name("dome.toml").write_text(CASE.replace(JOINT, ""), encoding="utf-8")
+    with pytest.raises(InputError, match=r"rod\.radius"):
+        read_study(file)
 
 
 def test_what_follows_for_a_count_and_is_not_whole_is_refused_and_not_rounded(tmp_path):

@@ -17,6 +17,7 @@ import trimesh
 from shellform.errors import InputError
 from shellform.surface import cad
 from shellform.surface.readers import rhino
+from shellform.surface.readers.gltf import surface_files
 from shellform.surface.readers.meshes import write_mesh
 from shellform.surface.readers.network_faces import faces_in_plan
 from shellform.surface.readers.nurbs import Patch
@@ -665,6 +666,32 @@ def test_a_gltf_buffer_s_name_is_decoded_and_may_stand_in_a_folder_below(tmp_pat
     tree["buffers"][0]["uri"] = "the%20buffers/gr%C3%B6%C3%9Fe%201.bin"
     file.write_text(json.dumps(tree))
     assert len(read_surface(file).triangles) == len(TRIANGLES)
+
+
+def test_a_surface_is_read_from_its_file_and_the_buffers_that_a_scene_names_beside_it(tmp_path):
+    file = write_gltf(tmp_path / "a.gltf", y_up(POINTS), TRIANGLES)
+    assert surface_files(file) == [file]  # the buffer stands in it
+    tree = json.loads(file.read_text())
+    uris = ["one.bin", "two/b%20c.bin", "one.bin", "../out.bin", "/etc/hostname", "a%00b.bin"]
+    tree["buffers"] = [{"uri": uri, "byteLength": 1} for uri in uris]
+    file.write_text(json.dumps(tree))
+    assert surface_files(file) == [file, tmp_path / "one.bin", tmp_path / "two/b c.bin"]
+    other = tmp_path / "scene.txt"  # by its content a scene
+    other.write_bytes(b" \n" + file.read_bytes())
+    assert surface_files(other) == [other, *surface_files(file)[1:]]
+    binary = write_gltf(tmp_path / "a.glb", y_up(POINTS), TRIANGLES)
+    assert surface_files(binary) == [binary]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", '{"buffers": 1}', '{"buffers": [{"uri": 3}]}', "glTF", "glTF" + 16 * "x", "o shell"],
+)
+def test_a_file_that_is_no_whole_scene_names_no_buffers(tmp_path, text):
+    file = tmp_path / "a.gltf"
+    assert surface_files(file) == [file]  # where it isn't there either
+    file.write_text(text)
+    assert surface_files(file) == [file]
 
 
 def test_a_mesh_that_many_nodes_place_is_read_once_and_chosen_from_by_name(tmp_path):

@@ -13,6 +13,7 @@ import json
 import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -295,10 +296,8 @@ class _Scene:
 
     def _beside(self, uri: str) -> Path:
         """The file that a buffer's address names, in the scene's folder or below. Raises InputError."""
-        folder = self._file.parent.resolve()
-        named = unquote(uri)
-        beside = (folder / named).resolve()
-        if not beside.is_relative_to(folder) or "\0" in named:
+        beside = _place(self._file, uri)
+        if beside is None:
             raise InputError(
                 f"its buffer {uri[:_TOLD]!r} lies outside its folder, where nothing is read",
                 where=str(self._file),
@@ -317,6 +316,40 @@ class _Scene:
                 remedy="Export a coarser mesh, or the surface alone.",
             )
         return beside
+
+
+def surface_files(file: Path) -> list[Path]:
+    """What a surface's file, in any format, is read from: itself and, where it is a scene, the buffers that
+    it names in its folder or below, there or not. One that can't be read names none; its reader says why.
+    """
+    try:
+        status = file.stat()
+        named = _named(file, status.st_size, status.st_mtime_ns)
+    except (ValueError, TypeError, AttributeError, struct.error, OSError, RecursionError, InputError):
+        named = ()
+    return [file, *named]
+
+
+@cache
+def _named(file: Path, size: int, written: int) -> tuple[Path, ...]:
+    """The buffers that a file names as it was when it had this size and time: studies ask many times."""
+    with open(file, "rb") as begun:
+        head = begun.read(64).lstrip()
+    if size > MOST_BYTES or not head.startswith((b"glTF", b"{")):
+        return ()
+    tree = _opened(file)[0]
+    uris = [each["uri"] for each in tree.get("buffers", []) if "uri" in each]
+    places = [_place(file, uri) for uri in uris if not uri.startswith("data:")]
+    return tuple(dict.fromkeys(each for each in places if each is not None))
+
+
+def _place(file: Path, uri: str) -> Path | None:
+    """Where a buffer's address leads from a scene's file; None out of its folder."""
+    folder, named = file.parent.resolve(), unquote(uri)
+    if "\0" in named:
+        return None
+    place = (folder / named).resolve()
+    return place if place.is_relative_to(folder) else None
 
 
 def _placement(entry: dict[str, Any]) -> Reals:
