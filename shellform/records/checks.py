@@ -39,9 +39,9 @@ class _Judged:
     rods: Mapping[str, RodsOf]
 
     @property
-    def factors(self) -> dict[str, float]:
-        """Of the load cases, in their order, times the design load."""
-        return {load: row.loads[load].factor for row in self.rows.values() for load in row.loads}
+    def factors(self) -> dict[str, float | None]:
+        """Of the load cases, in their order, times the design load; None of one that is no multiple of it."""
+        return {load: row.loads[load].times for row in self.rows.values() for load in row.loads}
 
     def under(
         self, title: str, limit: str, cell: Callable[[LoadRecord, RodsOf], Cell], loads: Sequence[str]

@@ -323,3 +323,13 @@ def test_the_terminal_names_limits_that_are_broken_by_more_than_a_thousandth(cap
     told = made.summary(["optimised"], constraints={"cable_force": 0.0016, "misfit": 0.0008})
     tell_designs(told)
     assert "limits that are not kept: cable_force by 0.2%\n" in capsys.readouterr().out
+
+
+def test_checks_under_a_load_that_is_no_multiple_of_the_design_load_name_no_factor(shell, designs):
+    for multiple, words in ((True, "1.2 × the load"), (False, "the additional load")):
+        given = summary(designs)
+        for name, row in given.designs.items():
+            loads = {**row.loads, "additional": replace(row.loads["additional"], multiple=multiple)}
+            given = given.with_design(name, replace(row, loads=loads))
+        titles = [each.title for each in checks(every(shell, designs), designs, given, BOUNDS)]
+        assert f"Stands under {words}" in titles
