@@ -4,6 +4,7 @@ from.
 
 import base64
 import json
+import tracemalloc
 from pathlib import Path
 
 import meshio
@@ -17,9 +18,11 @@ import trimesh
 from shellform.errors import InputError
 from shellform.surface import cad
 from shellform.surface.readers import rhino
+from shellform.surface.readers.draft import Choice
 from shellform.surface.readers.meshes import write_mesh
 from shellform.surface.readers.network_faces import faces_in_plan
 from shellform.surface.readers.nurbs import Patch
+from shellform.surface.readers.plain import read_obj
 from shellform.surface.readers.reading import read_surface
 from tests.surface.brought import rhino_mesh
 from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl, y_up
@@ -299,6 +302,27 @@ def test_objects_and_groups_of_an_obj_file_can_be_chosen(tmp_path):
         read_surface(file, name="dome")
     with pytest.raises(InputError, match="2 separate pieces"):
         read_surface(file)
+
+
+def test_an_obj_file_of_a_group_a_panel_takes_as_much_memory_as_one_of_a_single_group(tmp_path):
+    """2,500 panels of four corners each; with all corners for each panel they took 600 MB."""
+    lines = []
+    for k in range(2500):
+        x, y = np.divmod(k, 50)
+        lines += [f"v {x + a} {y + b} 1" for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        lines += [f"g panel {k}", "f -4 -3 -2 -1"]
+    file = tmp_path / "panels.obj"
+    file.write_text("\n".join(lines))
+    tracemalloc.start()
+    try:
+        draft = read_obj(file, Choice())
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 30e6
+    assert (len(draft.points), len(draft.triangles), len(draft.objects)) == (10_000, 5000, 2500)
+    assert read_surface(file).mended == ("7399 vertices lay on others and were merged",)
+    assert read_surface(file, layer="panel 7").mended == ()
 
 
 def test_an_unknown_ending_is_read_by_its_content(tmp_path):
