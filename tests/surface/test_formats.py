@@ -16,7 +16,7 @@ import rhino3dm
 import trimesh
 
 from shellform.errors import InputError
-from shellform.surface import cad
+from shellform.surface import cad, occ
 from shellform.surface.readers import rhino
 from shellform.surface.readers.draft import Choice
 from shellform.surface.readers.meshes import write_mesh
@@ -67,13 +67,38 @@ def test_meshio_s_own_files_come_back(tmp_path, name, binary):
     same_shell(read_surface(tmp_path / name))
 
 
-def test_curved_elements_of_a_msh_file_count_by_their_corners(tmp_path):
-    middle = np.vstack([POINTS, POINTS[QUADS[:, :2]].mean(axis=1)])
-    quads = np.column_stack([QUADS, *[len(POINTS) + np.arange(len(QUADS))] * 4])
-    meshio.Mesh(middle, [("quad8", quads)]).write(tmp_path / "a.msh", file_format="gmsh")
+@pytest.mark.parametrize(
+    "kind", ["triangle6", "triangle10", "triangle15", "quad8", "quad9", "quad16", "quad25"]
+)
+def test_curved_elements_of_a_msh_file_count_by_their_corners(tmp_path, kind):
+    corners = QUADS if kind.startswith("quad") else TRIANGLES
+    inner = int(kind.removeprefix("triangle").removeprefix("quad")) - corners.shape[1]
+    middle = np.vstack([POINTS, POINTS[corners[:, :2]].mean(axis=1)])
+    cells = np.column_stack([corners, *[len(POINTS) + np.arange(len(corners))] * inner])
+    meshio.Mesh(middle, [(kind, cells)]).write(tmp_path / "a.msh", file_format="gmsh")
     surface = read_surface(tmp_path / "a.msh")
     assert len(surface.vertices) == len(POINTS)
+    assert surface.area == pytest.approx(read_surface(write_obj(tmp_path / "a.obj", POINTS, corners)).area)
     assert any("points of no face" in note for note in surface.mended)
+
+
+@pytest.mark.parametrize("order", [2, 3, 4])
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_gmsh_s_own_curved_meshes_are_read(tmp_path, order, version):
+    """A quarter of a cylinder, 2 m in radius and 3 m long, of triangles of that order."""
+    file = tmp_path / "a.msh"
+    with occ.session():
+        arc = occ.gmsh.model.occ.addCircle(0, 0, 0, 2.0, angle1=0.25 * np.pi, angle2=0.75 * np.pi)
+        occ.gmsh.model.occ.extrude([(1, arc)], 0.0, 0.0, 3.0)
+        occ.gmsh.model.occ.synchronize()
+        occ.gmsh.option.setNumber("Mesh.MeshSizeMax", 0.2)
+        occ.gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        occ.gmsh.model.mesh.generate(2)
+        occ.gmsh.model.mesh.setOrder(order)
+        occ.gmsh.write(str(file))
+    surface = read_surface(file, up="y")
+    assert surface.area == pytest.approx(3.0 * np.pi, rel=2e-3)
+    assert len(surface.boundary) == 1
 
 
 @pytest.mark.parametrize("name", ["a.vtk", "a.vtp", "grid.vtk", "grid.vtu"])
