@@ -527,6 +527,32 @@ def test_rhino_s_blocks_stand_where_their_instances_are(tmp_path):
     assert surface.vertices[:, 0].mean() == pytest.approx(50.0, abs=1e-4)
 
 
+@pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (2.0, 1.0, 1.0), (1.0, 1.0, 1.5), (-1.0, 1.0, 1.0)])
+def test_a_surface_of_revolution_in_a_block_is_stretched_as_its_instance_says(tmp_path, stretch):
+    """A part of a ball of 3 m, cut off 1 m above its middle by its profile's end."""
+    end = np.sqrt(8.0)
+    profile = rhino3dm.Arc(
+        rhino3dm.Point3d(0.0, 0.0, 3.0),
+        rhino3dm.Point3d(3.0 * np.sin(0.5), 0.0, 3.0 * np.cos(0.5)),
+        rhino3dm.Point3d(end, 0.0, 1.0),
+    )
+    axis = rhino3dm.Line(rhino3dm.Point3d(0.0, 0.0, 0.0), rhino3dm.Point3d(0.0, 0.0, 1.0))
+    turned = rhino3dm.RevSurface.Create(profile.ToNurbsCurve(), axis, 0.0, 2.0 * np.pi)
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
+    nothing = rhino3dm.ObjectAttributes()
+    model.InstanceDefinitions.Add("cap", "", "", "", rhino3dm.Point3d(0, 0, 0), (turned,), (nothing,))
+    place = rhino3dm.Transform(1.0)
+    place.M00, place.M11, place.M22 = stretch
+    model.Objects.AddInstanceObject(rhino3dm.InstanceReference(model.InstanceDefinitions[0].Id, place))
+    model.Write(str(tmp_path / "a.3dm"), 7)
+    surface = read_surface(tmp_path / "a.3dm", size=0.3)
+    middle = surface.vertices / stretch
+    np.testing.assert_allclose(np.linalg.norm(middle, axis=1), 3.0, atol=1e-6)
+    assert middle[:, 2].min() == pytest.approx(1.0, abs=1e-6)
+    assert len(surface.boundary) == 1
+
+
 def test_rhino_tutorial_file_of_others_is_read_by_object():
     # 220 curves, a mesh and a plane brep of 10 × 10 mm.
     file = ROOT / "tests/data/tna_tutorial.3dm"
