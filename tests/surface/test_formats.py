@@ -134,6 +134,35 @@ def test_gltf_is_y_up_in_metres_and_its_nodes_place_the_meshes(tmp_path, name):
     np.testing.assert_allclose(small.size, [0.004, 0.0015, 0.006], atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("code", "kind", "lowest"),
+    [(5120, "<i1", -127), (5121, "<u1", 0), (5122, "<i2", -32767), (5123, "<u2", 0)],
+)
+def test_whole_numbers_of_a_gltf_that_stand_for_shares_of_one_are_divided(tmp_path, code, kind, lowest):
+    """As KHR_mesh_quantization stores coordinates: from the type's lowest number, which is -1 or 0, to its
+    largest, which is 1; the node scales them back."""
+    points = y_up(POINTS)
+    low, high = points.min(axis=0), points.max(axis=0)
+    most = np.iinfo(kind).max
+    whole = np.round(lowest + (points - low) / (high - low) * (most - lowest)).astype(kind)
+    if lowest < 0:
+        whole[whole == lowest] -= 1  # the least that the type has, which stands for -1 too
+    parts = (high - low) / (1.0 if lowest == 0 else 2.0)
+    width = 4 * -(-3 * whole.itemsize // 4)  # rows begin at whole words
+    rows = np.zeros((len(whole), width), "<u1")
+    rows[:, : 3 * whole.itemsize] = whole.view("<u1").reshape(len(whole), -1)
+    data = rows.tobytes() + TRIANGLES.astype("<u2").tobytes()
+    tree = json.loads(write_gltf(tmp_path / "a.gltf", points, TRIANGLES).read_text())
+    tree["extensionsRequired"] = ["KHR_mesh_quantization", "KHR_materials_unlit", "KHR_texture_transform"]
+    tree["nodes"] = [{"mesh": 0, "scale": parts.tolist(), "translation": (high - parts).tolist()}]
+    tree["accessors"][0] |= {"componentType": code, "normalized": True}
+    tree["bufferViews"][0] |= {"byteLength": rows.size, "byteStride": width}
+    tree["bufferViews"][1]["byteOffset"] = rows.size
+    tree["buffers"] = [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}]
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    same_shell(read_surface(tmp_path / "a.gltf"), atol=6.0 / (most - lowest))
+
+
 def test_a_gltf_buffer_may_stand_beside_the_file(tmp_path):
     file = write_gltf(tmp_path / "a.gltf", y_up(POINTS), TRIANGLES)
     tree = json.loads(file.read_text())
