@@ -183,8 +183,17 @@ def test_gltf_files_that_need_what_is_not_here_are_refused_by_name(tmp_path):
     tree = json.loads(write_gltf(tmp_path / "a.gltf", POINTS, TRIANGLES).read_text())
     for change, word in [
         ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "compressed (KHR_draco_mesh_compression)"),
+        (
+            {"extensionsRequired": ["KHR_mesh_quantization", "VENDOR_shape"]},
+            "needs an extension that isn't read here (VENDOR_shape)",
+        ),
+        (
+            {"nodes": [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {}}}}]},
+            "(EXT_mesh_gpu_instancing)",
+        ),
         ({"nodes": [{"children": [0]}]}, "go round in a circle"),
         ({"accessors": [{**each, "sparse": {}} for each in tree["accessors"]]}, "sparse"),
+        ({"accessors": [{**each, "sparse": {}, "normalized": True} for each in tree["accessors"]]}, "sparse"),
         ({"accessors": [{**each, "count": 10000} for each in tree["accessors"]]}, "shorter than it says"),
         ({"meshes": []}, "can't be read as glTF"),
     ]:

@@ -1,6 +1,7 @@
 """Which objects of a file are the surface, and how its polygons become triangles."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,6 +71,31 @@ def test_chosen_parts_are_numbered_one_after_the_other():
     found = joined(parts, Choice(name="a"), "f.obj")
     np.testing.assert_array_equal(found.points, np.vstack([SQUARE, SQUARE + 9.0]))
     assert found.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [7, 5, 6], [4, 5, 7]]
+
+
+def test_points_that_objects_share_stand_once_in_the_whole_and_none_of_those_left_out():
+    square, other = SQUARE, SQUARE + 7.0
+    parts = [
+        MeshObject("a", "", square, (np.array([[0, 1, 2]]),)),
+        MeshObject("b", "", other, (np.array([[0, 1, 2, 3]]),)),
+        MeshObject("c", "", square, (np.array([[1, 3, 2]]),)),
+    ]
+    found = joined(parts, Choice(), "f.obj")
+    np.testing.assert_array_equal(found.points, np.vstack([square, other]))
+    assert found.triangles.tolist() == [[0, 1, 2], [4, 5, 6], [4, 6, 7], [1, 3, 2]]
+    alone = joined(parts, Choice(name="c"), "f.obj")
+    np.testing.assert_array_equal(alone.points, square[1:])
+    assert alone.triangles.tolist() == [[0, 2, 1]]
+
+
+def test_a_point_of_no_face_is_kept_to_be_told_beside_objects_left_out():
+    parts = [MeshObject(name, "", SQUARE, (np.array([[0, 1, 2]]),)) for name in "ab"]
+    np.testing.assert_array_equal(joined(parts, Choice(name="a"), "f.obj").points, SQUARE)
+    parts = [
+        replace(part, faces=(np.array([face]),))
+        for part, face in zip(parts, [[0, 1, 2], [4, 1, -1]], strict=True)
+    ]
+    np.testing.assert_array_equal(joined(parts, Choice(name="a"), "f.obj").points, SQUARE)
 
 
 @pytest.mark.parametrize(

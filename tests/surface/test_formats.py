@@ -4,6 +4,7 @@ from.
 
 import base64
 import json
+import tracemalloc
 from pathlib import Path
 
 import meshio
@@ -15,12 +16,14 @@ import rhino3dm
 import trimesh
 
 from shellform.errors import InputError
-from shellform.surface import cad
+from shellform.surface import cad, occ
 from shellform.surface.readers import rhino
+from shellform.surface.readers.draft import Choice
 from shellform.surface.readers.gltf import surface_files
 from shellform.surface.readers.meshes import write_mesh
 from shellform.surface.readers.network_faces import faces_in_plan
 from shellform.surface.readers.nurbs import Patch
+from shellform.surface.readers.plain import read_obj
 from shellform.surface.readers.reading import read_surface
 from tests.surface.brought import rhino_mesh
 from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl, y_up
@@ -65,13 +68,38 @@ def test_meshio_s_own_files_come_back(tmp_path, name, binary):
     same_shell(read_surface(tmp_path / name))
 
 
-def test_curved_elements_of_a_msh_file_count_by_their_corners(tmp_path):
-    middle = np.vstack([POINTS, POINTS[QUADS[:, :2]].mean(axis=1)])
-    quads = np.column_stack([QUADS, *[len(POINTS) + np.arange(len(QUADS))] * 4])
-    meshio.Mesh(middle, [("quad8", quads)]).write(tmp_path / "a.msh", file_format="gmsh")
+@pytest.mark.parametrize(
+    "kind", ["triangle6", "triangle10", "triangle15", "quad8", "quad9", "quad16", "quad25"]
+)
+def test_curved_elements_of_a_msh_file_count_by_their_corners(tmp_path, kind):
+    corners = QUADS if kind.startswith("quad") else TRIANGLES
+    inner = int(kind.removeprefix("triangle").removeprefix("quad")) - corners.shape[1]
+    middle = np.vstack([POINTS, POINTS[corners[:, :2]].mean(axis=1)])
+    cells = np.column_stack([corners, *[len(POINTS) + np.arange(len(corners))] * inner])
+    meshio.Mesh(middle, [(kind, cells)]).write(tmp_path / "a.msh", file_format="gmsh")
     surface = read_surface(tmp_path / "a.msh")
     assert len(surface.vertices) == len(POINTS)
+    assert surface.area == pytest.approx(read_surface(write_obj(tmp_path / "a.obj", POINTS, corners)).area)
     assert any("points of no face" in note for note in surface.mended)
+
+
+@pytest.mark.parametrize("order", [2, 3, 4])
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_gmsh_s_own_curved_meshes_are_read(tmp_path, order, version):
+    """A quarter of a cylinder, 2 m in radius and 3 m long, of triangles of that order."""
+    file = tmp_path / "a.msh"
+    with occ.session():
+        arc = occ.gmsh.model.occ.addCircle(0, 0, 0, 2.0, angle1=0.25 * np.pi, angle2=0.75 * np.pi)
+        occ.gmsh.model.occ.extrude([(1, arc)], 0.0, 0.0, 3.0)
+        occ.gmsh.model.occ.synchronize()
+        occ.gmsh.option.setNumber("Mesh.MeshSizeMax", 0.2)
+        occ.gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        occ.gmsh.model.mesh.generate(2)
+        occ.gmsh.model.mesh.setOrder(order)
+        occ.gmsh.write(str(file))
+    surface = read_surface(file, up="y")
+    assert surface.area == pytest.approx(3.0 * np.pi, rel=2e-3)
+    assert len(surface.boundary) == 1
 
 
 @pytest.mark.parametrize("name", ["a.vtk", "a.vtp", "grid.vtk", "grid.vtu"])
@@ -105,6 +133,35 @@ def test_gltf_is_y_up_in_metres_and_its_nodes_place_the_meshes(tmp_path, name):
     np.testing.assert_allclose(surface.vertices[:, 2].max(), 11.5, atol=1e-5)
     small = read_surface(tmp_path / name, unit="mm", up="z")
     np.testing.assert_allclose(small.size, [0.004, 0.0015, 0.006], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("code", "kind", "lowest"),
+    [(5120, "<i1", -127), (5121, "<u1", 0), (5122, "<i2", -32767), (5123, "<u2", 0)],
+)
+def test_whole_numbers_of_a_gltf_that_stand_for_shares_of_one_are_divided(tmp_path, code, kind, lowest):
+    """As KHR_mesh_quantization stores coordinates: from the type's lowest number, which is -1 or 0, to its
+    largest, which is 1; the node scales them back."""
+    points = y_up(POINTS)
+    low, high = points.min(axis=0), points.max(axis=0)
+    most = np.iinfo(kind).max
+    whole = np.round(lowest + (points - low) / (high - low) * (most - lowest)).astype(kind)
+    if lowest < 0:
+        whole[whole == lowest] -= 1  # the least that the type has, which stands for -1 too
+    parts = (high - low) / (1.0 if lowest == 0 else 2.0)
+    width = 4 * -(-3 * whole.itemsize // 4)  # rows begin at whole words
+    rows = np.zeros((len(whole), width), "<u1")
+    rows[:, : 3 * whole.itemsize] = whole.view("<u1").reshape(len(whole), -1)
+    data = rows.tobytes() + TRIANGLES.astype("<u2").tobytes()
+    tree = json.loads(write_gltf(tmp_path / "a.gltf", points, TRIANGLES).read_text())
+    tree["extensionsRequired"] = ["KHR_mesh_quantization", "KHR_materials_unlit", "KHR_texture_transform"]
+    tree["nodes"] = [{"mesh": 0, "scale": parts.tolist(), "translation": (high - parts).tolist()}]
+    tree["accessors"][0] |= {"componentType": code, "normalized": True}
+    tree["bufferViews"][0] |= {"byteLength": rows.size, "byteStride": width}
+    tree["bufferViews"][1]["byteOffset"] = rows.size
+    tree["buffers"] = [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}]
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    same_shell(read_surface(tmp_path / "a.gltf"), atol=6.0 / (most - lowest))
 
 
 def test_a_gltf_buffer_may_stand_beside_the_file(tmp_path):
@@ -302,6 +359,27 @@ def test_objects_and_groups_of_an_obj_file_can_be_chosen(tmp_path):
         read_surface(file)
 
 
+def test_an_obj_file_of_a_group_a_panel_takes_as_much_memory_as_one_of_a_single_group(tmp_path):
+    """2,500 panels of four corners each; with all corners for each panel they took 600 MB."""
+    lines = []
+    for k in range(2500):
+        x, y = np.divmod(k, 50)
+        lines += [f"v {x + a} {y + b} 1" for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        lines += [f"g panel {k}", "f -4 -3 -2 -1"]
+    file = tmp_path / "panels.obj"
+    file.write_text("\n".join(lines))
+    tracemalloc.start()
+    try:
+        draft = read_obj(file, Choice())
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 30e6
+    assert (len(draft.points), len(draft.triangles), len(draft.objects)) == (10_000, 5000, 2500)
+    assert read_surface(file).mended == ("7399 vertices lay on others and were merged",)
+    assert read_surface(file, layer="panel 7").mended == ()
+
+
 def test_an_unknown_ending_is_read_by_its_content(tmp_path):
     same_shell(read_surface(write_obj(tmp_path / "shell.txt", POINTS, QUADS)))
     same_shell(read_surface(write_stl(tmp_path / "shell", POINTS, TRIANGLES)))
@@ -477,6 +555,32 @@ def test_rhino_s_blocks_stand_where_their_instances_are(tmp_path):
     surface = read_surface(tmp_path / "a.3dm")
     same_shell(surface, atol=1e-5)
     assert surface.vertices[:, 0].mean() == pytest.approx(50.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (2.0, 1.0, 1.0), (1.0, 1.0, 1.5), (-1.0, 1.0, 1.0)])
+def test_a_surface_of_revolution_in_a_block_is_stretched_as_its_instance_says(tmp_path, stretch):
+    """A part of a ball of 3 m, cut off 1 m above its middle by its profile's end."""
+    end = np.sqrt(8.0)
+    profile = rhino3dm.Arc(
+        rhino3dm.Point3d(0.0, 0.0, 3.0),
+        rhino3dm.Point3d(3.0 * np.sin(0.5), 0.0, 3.0 * np.cos(0.5)),
+        rhino3dm.Point3d(end, 0.0, 1.0),
+    )
+    axis = rhino3dm.Line(rhino3dm.Point3d(0.0, 0.0, 0.0), rhino3dm.Point3d(0.0, 0.0, 1.0))
+    turned = rhino3dm.RevSurface.Create(profile.ToNurbsCurve(), axis, 0.0, 2.0 * np.pi)
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
+    nothing = rhino3dm.ObjectAttributes()
+    model.InstanceDefinitions.Add("cap", "", "", "", rhino3dm.Point3d(0, 0, 0), (turned,), (nothing,))
+    place = rhino3dm.Transform(1.0)
+    place.M00, place.M11, place.M22 = stretch
+    model.Objects.AddInstanceObject(rhino3dm.InstanceReference(model.InstanceDefinitions[0].Id, place))
+    model.Write(str(tmp_path / "a.3dm"), 7)
+    surface = read_surface(tmp_path / "a.3dm", size=0.3)
+    middle = surface.vertices / stretch
+    np.testing.assert_allclose(np.linalg.norm(middle, axis=1), 3.0, atol=1e-6)
+    assert middle[:, 2].min() == pytest.approx(1.0, abs=1e-6)
+    assert len(surface.boundary) == 1
 
 
 def test_rhino_tutorial_file_of_others_is_read_by_object():

@@ -1,5 +1,7 @@
 """Seams and slivers of a few triangles each, whose gaps and proportions are known beforehand."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,26 @@ def test_ends_of_a_short_edge_are_not_joined_with_each_other():
     found, joined, moved = seams._vertices_joined(Draft(points, TWO), 0.1)
     assert (joined, moved) == (0, 0.0)
     np.testing.assert_array_equal(found.triangles, TWO)
+
+
+@pytest.mark.parametrize("noise", [1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize("count", [3, 4, 5, 6, 8])
+def test_wedges_that_meet_in_one_point_leave_no_slit_between_them(count, noise):
+    """A disc of 5 m parted into wedges, each with corners of its own, up to that far, in m, from
+    where they were meant."""
+    angle = 2.0 * np.pi * np.arange(count + 1) / count
+    wedges = []
+    for one, other in pairwise(angle):
+        sides = np.array([[np.cos(one), np.sin(one), 0.0], [np.cos(other), np.sin(other), 0.0]])
+        wedges.append(np.vstack([np.zeros((1, 3)), *(r * sides for r in (1.0, 2.0, 3.0, 4.0, 5.0))]))
+    fan = [[0, 1, 2], *([k + a for a in corner] for k in (1, 3, 5, 7) for corner in ([0, 2, 3], [0, 3, 1]))]
+    points = np.vstack(wedges)
+    points = points + noise * np.random.default_rng(count).uniform(-1.0, 1.0, points.shape)
+    triangles = np.vstack([np.array(fan) + 11 * k for k in range(count)])
+    found = sewn(Draft(points, triangles), 10.0)
+    assert len(found.points) == 1 + 5 * count
+    assert len(open_edges(found.triangles)) == count  # round the disc, and nowhere else
+    assert flat_area(found).sum() == pytest.approx(12.5 * count * np.sin(2.0 * np.pi / count), rel=1e-3)
 
 
 @pytest.mark.parametrize(

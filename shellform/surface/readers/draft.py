@@ -43,7 +43,7 @@ class Draft(Record):
 @dataclass(frozen=True, eq=False)
 class MeshObject(Record):
     """One object of a file: `points` (v, 3) and its `faces`, arrays (f, k) of polygons with k corners
-    each.
+    each. Objects that share their points, as an OBJ's do, have one array of them.
     """
 
     name: str
@@ -109,19 +109,22 @@ def choosable(draft: Draft) -> str:
 
 
 def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:
-    """All chosen parts as one mesh of triangles. Raises InputError where there is no face."""
+    """All chosen parts as one mesh of triangles, points that they share once. Raises InputError where there
+    is no face."""
     if not any(len(block) for part in parts for block in part.faces):
         raise InputError(
             "holds no faces, only points or lines", where=where, remedy="Export the surface, or a mesh of it."
         )
-    kept = [
-        part
-        for part, meant in zip(parts, among([(p.layer, p.name) for p in parts], choice, where), strict=True)
-        if meant
-    ]
-    points, triangles, count = [], [], 0
+    chosen = among([(p.layer, p.name) for p in parts], choice, where)
+    kept = [part for part, meant in zip(parts, chosen, strict=True) if meant]
+    points, triangles, count = list[Reals](), list[Indices](), 0
+    begins: dict[int, int] = {}  # where the parts' points stand in the whole, by which array they are
     for part in kept:
-        check_points(part.points, where)
+        if id(part.points) not in begins:
+            check_points(part.points, where)
+            begins[id(part.points)] = count
+            points.append(part.points)
+            count += len(part.points)
         for block in part.faces:
             if len(block) and not (block.min() >= 0 and block.max() < len(part.points)):
                 raise InputError(
@@ -136,9 +139,7 @@ def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:
                     where=where,
                     remedy="Export triangles.",
                 )
-            triangles.append(triangulated(part.points, block) + count)
-        points.append(part.points)
-        count += len(part.points)
+            triangles.append(triangulated(part.points, block) + begins[id(part.points)])
     faces = np.vstack([np.zeros((0, 3), dtype=np.int64), *triangles])
     if len(faces) > MOST_TRIANGLES:
         raise InputError(
@@ -146,9 +147,19 @@ def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:
             where=where,
             remedy="Export a coarser mesh.",
         )
+    whole = np.vstack(points)
+    others = np.zeros(
+        len(whole), dtype=bool
+    )  # points of objects left out alone: no loose ones, of which notes tell
+    for part, meant in zip(parts, chosen, strict=True):
+        if not meant and id(part.points) in begins:
+            for block in part.faces:
+                inside = block[(block >= 0) & (block < len(part.points))]
+                others[inside + begins[id(part.points)]] = True
+    others[faces.ravel()] = False
     return Draft(
-        np.vstack(points),
-        faces,
+        whole[~others],
+        (np.cumsum(~others) - 1)[faces],
         objects=tuple(called(p.layer, p.name) for p in kept if any(map(len, p.faces))),
     )
 

@@ -1,9 +1,10 @@
 """GLTF and GLB scenes (Khronos glTF 2.0): their meshes, placed by their nodes; and GLB files written.
 
 The format's unit is the metre (many programs write others all the same: state it) and its vertical axis y.
-Buffers may stand in the GLB, in the text as base64, or in files beside it or in folders below. Compressed
-meshes (Draco, meshopt) and sparse accessors are refused by name, and so are nodes with two parents, which the
-format forbids: they could place a mesh without end.
+Buffers may stand in the GLB, in the text as base64, or in files beside it or in folders below. Whole numbers
+that stand for shares of one (`normalized`) are divided. Extensions that a scene needs are refused by name
+unless they leave its shape alone, and so are compressed meshes (Draco, meshopt), instances and sparse
+accessors; nodes with two parents too, which the format forbids: they could place a mesh without end.
 """
 
 from __future__ import annotations
@@ -38,6 +39,11 @@ _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126:
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _JSON, _BIN = 0x4E4F534A, 0x004E4942  # kinds of chunks of a .glb
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of primitives
+# Extensions that are read, or without which a scene has the same shape: whole numbers for coordinates, of
+# which accessors tell, and what is seen of it
+_KNOWN = ("KHR_mesh_quantization",)
+_SEEN = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
+_INSTANCES = "EXT_mesh_gpu_instancing"  # of a mesh, in a node
 _TOLD = 80  # characters of an address that are quoted
 _VERTICES, _ELEMENTS = 34962, 34963  # what a buffer view is for
 
@@ -190,6 +196,12 @@ class _Scene:
                 raise InputError(
                     f"is compressed ({name})", where=str(file), remedy="Export it without compression."
                 )
+            if name not in (*_KNOWN, _INSTANCES) and not name.startswith(_SEEN):
+                raise InputError(
+                    f"needs an extension that isn't read here ({name[:_TOLD]})",
+                    where=str(file),
+                    remedy="Export it without that extension.",
+                )
 
     def placed(self, roots: Iterable[int]) -> list[_Placed]:
         """Every mesh that the nodes from `roots` on place, in their order."""
@@ -206,6 +218,13 @@ class _Scene:
             seen.add(node)
             entry = entries[node]
             here = above @ _placement(entry)
+            if _INSTANCES in entry.get("extensions", {}):
+                raise InputError(
+                    f"its node {node} places a mesh many times by an extension that isn't read here "
+                    f"({_INSTANCES})",
+                    where=str(self._file),
+                    remedy="Export it without instancing, as a node or a mesh for each.",
+                )
             if "mesh" in entry:
                 mesh = self._tree["meshes"][entry["mesh"]]
                 layer = str(mesh.get("name") or "")
@@ -281,7 +300,10 @@ class _Scene:
                 where=str(self._file),
                 remedy="Copy or export it anew.",
             )
-        return np.ndarray((count, width), kind, data, begin, (stride, kind.itemsize)).copy()
+        rows = np.ndarray((count, width), kind, data, begin, (stride, kind.itemsize)).copy()
+        if entry.get("normalized") and kind.kind != "f":
+            return np.maximum(rows / np.iinfo(kind).max, -1.0)  # both -128 and -127 are -1
+        return rows
 
     def _buffer(self, index: int) -> bytes:
         if index not in self._loaded:

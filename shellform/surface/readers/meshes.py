@@ -28,7 +28,7 @@ _WRITTEN = {
 }
 _STAMPED = ("obj", "ply")
 _STAMP = re.compile(rb"(Created by meshio v[^,\n]*), [^\n]*")  # when, which no other file of a run says
-_CORNERS = {"triangle6": 3, "triangle7": 3, "quad8": 4, "quad9": 4}  # of curved elements, which come first
+_CORNERS = {"triangle": 3, "quad": 4}  # which come first of the points of curved elements, of whatever order
 
 
 def read_msh(file: Path, choice: Choice) -> Draft:
@@ -50,7 +50,7 @@ def read_msh(file: Path, choice: Choice) -> Draft:
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
     faces = tuple(
-        np.asarray(block.data, dtype=np.int64)[:, : _CORNERS.get(block.type)]
+        np.asarray(block.data, dtype=np.int64)[:, : _CORNERS.get(block.type.rstrip("0123456789"))]
         for block in mesh.cells
         if block.type.startswith(("triangle", "quad", "polygon"))
     )

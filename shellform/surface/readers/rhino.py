@@ -211,7 +211,9 @@ def _placed(
                 yield from _placed(members[member], [shape.Xform, *places], members, blocks, layers)
         return
     if places:
-        shape = shape.Duplicate()
+        # Stretched along one axis or sheared it is of revolution no more, and Rhino's would become another.
+        turns = isinstance(shape, rhino3dm.RevSurface)
+        shape = shape.ToNurbsSurface() if turns else shape.Duplicate()
         for place in places:
             shape.Transform(place)
     yield layers.get(each.Attributes.LayerIndex, ""), str(each.Attributes.Name or ""), shape

@@ -26,7 +26,7 @@ _MOST_GAP = 1e-3  # of the size
 _INSIDE = 1e-3  # of an edge's length: nearer to its ends than that is no T-junction
 _SLIVER = 0.01  # height over longest side
 _SHORT = 0.05  # shortest over longest side, below which a sliver loses its short side
-_ROUNDS = 8  # of closing gaps and of removing slivers, each at the most
+_ROUNDS = 8  # of joining vertices, of cutting edges and of removing slivers, each at the most
 
 
 def sewn(draft: Draft, size: float) -> Draft:
@@ -38,7 +38,12 @@ def sewn(draft: Draft, size: float) -> Draft:
         return draft
     length = np.linalg.norm(draft.points[rim[:, 1]] - draft.points[rim[:, 0]], axis=1)
     reach = min(_GAP * float(length.mean()), _MOST_GAP * size)
-    draft, joined, gap = _vertices_joined(draft, reach)
+    joined, gap = 0, 0.0
+    for _ in range(_ROUNDS):  # each vertex once a round: where several patches meet, then pairs of pairs
+        draft, more, away = _vertices_joined(draft, reach)
+        joined, gap = joined + more, max(gap, away)
+        if not more:
+            break
     cut, off = 0, 0.0
     for _ in range(_ROUNDS):
         draft, more, away = _edges_cut(draft, reach)
