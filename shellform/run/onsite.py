@@ -61,9 +61,9 @@ def calibrate(
     output: Path | None = None,
     allow_scripts: bool = False,
 ) -> SiteResult:
-    """Connector stiffness from scans "POINTS.csv=LOAD" of the grid built as a run's `design` or, unbraced, as
-    a case says; LOAD is a load case or a CSV file of forces. Writes calibration.csv and calibration.toml.
-    Raises InputError, NotConverged."""
+    """Connector stiffness from scans "POINTS.csv=LOAD" of the grid built as a run's `design`, or before it
+    is braced, with the best design's rods or a case's; LOAD is a load case or a CSV file of forces. Writes
+    calibration.csv and calibration.toml. Raises InputError, NotConverged."""
     measurements.check_noise(noise)
     grid = scanned(source, design, output, allow_scripts=allow_scripts)
     shell = grid.shell

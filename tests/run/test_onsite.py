@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from shellform.case.case import load_case
 from shellform.errors import InputError
-from shellform.run import onsite
+from shellform.run import onsite, site_sources
 from shellform.run.folder import read_run
 from shellform.run.run import run_case
 from shellform.site import measurements
@@ -235,6 +235,23 @@ def test_scans_become_connector_stiffness(folder, run, tmp_path):
         folder / "case.toml", scans[:1], markers=markers, placed=True, free=["torsion"], output=tmp_path
     )
     assert any(line.startswith("torsion = ") for line in told.lines)
+
+
+def test_a_calibration_takes_the_rods_that_were_built_before_their_cables_unless_a_design_is_named(
+    folder, run, monkeypatch, tmp_path
+):
+    start = run.designs["initial"]
+    built = replace(start, radius=0.8 * start.radius, rest_length=0.99 * start.rest_length)
+    monkeypatch.setattr(
+        site_sources, "read_run", lambda _: replace(run, designs={**run.designs, "polished": built})
+    )
+    for name, radius, cables in (
+        (None, built.radius, 0),
+        ("polished", built.radius, len(start.present)),
+        ("unbraced", start.radius, 0),
+    ):
+        taken = site_sources.scanned(folder, name, tmp_path, allow_scripts=False).design
+        assert (taken.radius, taken.present.sum()) == (radius, cables)
 
 
 @pytest.mark.parametrize(
