@@ -13,7 +13,7 @@ from shellform.cli.terminal import tell_lines
 
 def calibrate(
     source: Annotated[
-        Path, typer.Argument(metavar="RUN|CASE", help="Run folder, or a case file: its grid unbraced.")
+        Path, typer.Argument(metavar="RUN|CASE", help="Run folder, or a case file: its grid without cables.")
     ],
     scans: Annotated[
         list[str],
@@ -23,7 +23,10 @@ def calibrate(
         ),
     ],
     design: Annotated[
-        str | None, typer.Option(help="Of the run, as which the grid was built; left out: unbraced.")
+        str | None,
+        typer.Option(
+            help="Of the run, as which the grid was built; left out: the run's last, without its cables."
+        ),
     ] = None,
     markers: Annotated[
         Path | None, typer.Option(help="CSV file with a column node or crossing; left out: every crossing.")

@@ -34,7 +34,8 @@ def survey(
     largest: Annotated[float, typer.Option(help="Largest change of a cable in one round, m.")] = 1.5e-3,
     cables: Annotated[int, typer.Option(help="Most cables that are turned in one round.")] = 60,
     after: Annotated[
-        Path | None, typer.Option(help="belief.npz of the round before, once its turns were made.")
+        Path | None,
+        typer.Option(help="belief-1.npz of the round before (belief-2.npz, …), once its turns were made."),
     ] = None,
     replay: Annotated[
         int | None,

@@ -4,30 +4,39 @@ best design.
 
 from __future__ import annotations
 
+import numpy as np
+
 from shellform.case.case import Case, StockRodEntry
+from shellform.errors import NotConverged
 from shellform.gridshell.catalogue import read_catalogue
+from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import rod_names
 from shellform.output.exchange import exports
 from shellform.output.workshop import drawings, nesting, schedules
 from shellform.output.workshop.schedules import Built, TitleBlock
 from shellform.output.workshop.splice_schedule import cutting_notes
 from shellform.output.workshop.turnbuckles import cut_counts
+from shellform.problem.paths import follow
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.summary import DocumentsRecord
 from shellform.run.folder import Run
+from shellform.structure.elements.state import State
+
+_UNKNOWN = (
+    "The grid without cables doesn't come to rest: the lengths that cables are hung in at are those in the wanted shape.",
+)
 
 
 def built_design(run: Run) -> Built:
     """The run's best design, a rounded one with the catalogue's rods; its cables are hung into the erected
-    grid before bracing.
+    grid of these rods before bracing, or where that doesn't come to rest, into the target.
     """
-    block = run.case.title_block
-    hung = run.states["unbraced"]["none"] if "unbraced" in run.states else None
+    block, shell = run.case.title_block, run.shell_of(run.best)
     return Built(
-        shell=run.shell_of(run.best),
+        shell=shell,
         design=run.designs[run.best],
         states=run.states[run.best],
-        hung=hung,
+        hung=_erected(shell, run.without_cables(run.best)),
         name=run.best,
         title=run.case.title,
         adjustment=run.case.cable.adjustment,
@@ -36,6 +45,15 @@ def built_design(run: Run) -> Built:
         loads=run.loads,
         force_limit=run.case.cable.force_max,
     )
+
+
+def _erected(shell: Gridshell, design: Design) -> State | None:
+    """The state without load of a design without cables; None where none is found."""
+    try:
+        found = follow(shell, design, {"none": np.zeros((shell.node_count, 6))})
+    except NotConverged:
+        return None
+    return found["none"].equilibrium.state
 
 
 def stock_length(case: Case) -> float:
@@ -64,7 +82,7 @@ def write_documents(run: Run, *, report: Report = unheard) -> DocumentsRecord:
     if exports.no_step():
         report(Event("documents", f"no STEP file: {exports.no_step()}", Kind.NOTE))
     bars, *spliced = cutting_notes(cutting, rod_names(run.net.grid))
-    doubts = (*spliced, *schedules.turnbuckles_of_cables(built))
+    doubts = (*spliced, *(_UNKNOWN if built.hung is None else ()), *schedules.turnbuckles_of_cables(built))
     for note in doubts:
         report(Event("documents", note, Kind.NOTE))
     cut = cut_counts(built.shell.cables(built.design).rest_length, built.adjustment)

@@ -61,9 +61,9 @@ def calibrate(
     output: Path | None = None,
     allow_scripts: bool = False,
 ) -> SiteResult:
-    """Connector stiffness from scans "POINTS.csv=LOAD" of the grid built as a run's `design` or, unbraced, as
-    a case says; LOAD is a load case or a CSV file of forces. Writes calibration.csv and calibration.toml.
-    Raises InputError, NotConverged."""
+    """Connector stiffness from scans "POINTS.csv=LOAD" of the grid built as a run's `design`, or before it
+    is braced, with the best design's rods or a case's; LOAD is a load case or a CSV file of forces. Writes
+    calibration.csv and calibration.toml. Raises InputError, NotConverged."""
     measurements.check_noise(noise)
     grid = scanned(source, design, output, allow_scripts=allow_scripts)
     shell = grid.shell
@@ -118,17 +118,19 @@ class Survey:
 
 def survey(folder: Path, measured: Path, options: Survey, output: Path | None = None) -> SiteResult:
     """The next turns of the turnbuckles from a survey of a run's grid as built. Writes turns.csv,
-    predicted.csv and belief.npz, which `options.after` of the next round names. Raises InputError,
-    NotConverged."""
+    predicted.csv and belief-1.npz, or the number of the round, which `options.after` of the next one names:
+    told again, a round gives the same turns. Raises InputError, NotConverged."""
     run = read_run(folder)
     name, shell, belief = _believed(run, options)
+    round_ = 1 if options.after is None else 1 + int(read_arrays(options.after).get("round", np.array(1)))
+    where = make_folder(output or run.folder / "schedules")
+    files = [where / each for each in ("turns.csv", "predicted.csv", f"belief-{round_}.npz")]
+    _refuse_overwriting(files, (measured, options.after))
     goal = run.states[name][options.load].positions
     origin = run.case.surface.origin
     seen = read_survey(measured, shell, belief.state, unit=options.unit, origin=origin)
     learnt = retensioning.learn(shell, belief, seen.nodes, seen.places, noise=options.noise)
     step = retensioning.adjust(shell, learnt, goal, options.crew, noise=options.noise)
-    where = make_folder(output or run.folder / "schedules")
-    files = [where / each for each in ("turns.csv", "predicted.csv", "belief.npz")]
     write_text(files[0], step.schedule(shell))
     write_text(files[1], _predicted(shell, learnt.state, step, goal))
     now = step.belief
@@ -141,6 +143,7 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
         positions=now.state.positions,
         quaternions=now.state.quaternions,
         origin=np.array(f"{name}/{options.load}"),
+        round=np.array(round_),
     )
     count = int(np.count_nonzero(step.turns))
     size = len(goal)
@@ -332,7 +335,7 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
             shell,
             retensioning.first_belief(shell, design, state, load, length_error=options.length_error),
         )
-    remedy = "Name the schedules/belief.npz of the round before."
+    remedy = "Name the schedules/belief-1.npz of the round before, or its number's."
     require_file(options.after)
     try:
         data = read_arrays(options.after)
@@ -372,6 +375,19 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
     known = replace(design, rest_length=data["rest_length"], radius=float(data["radius"]))
     there = State(data["positions"], data["quaternions"])
     return name, shell, retensioning.Belief(known, data["covariance"], there, load)
+
+
+def _refuse_overwriting(files: Sequence[Path], read: Sequence[Path | None]) -> None:
+    """Raises InputError where what is read would be overwritten: told again, the round would be another."""
+    for each in read:
+        if each is not None and any(
+            file.exists() and each.exists() and file.samefile(each) for file in files
+        ):
+            raise InputError(
+                "is read and would be overwritten",
+                where=str(each),
+                remedy="Give it another name, and name that, or choose another --output.",
+            )
 
 
 def _predicted(shell: Gridshell, before: State, step: retensioning.Adjustment, goal: Reals) -> str:

@@ -33,15 +33,15 @@ class Scanned(Record):
 
 
 def scanned(source: Path, design: str | None, output: Path | None, *, allow_scripts: bool) -> Scanned:
-    """The grid built as the `design` of a run folder, or unbraced, as it is in a case file and where none is
-    named. Results go to `output`, those of a run else to its schedules. Raises InputError for an unknown
-    design, and as the readers of both."""
+    """The grid built as the `design` of a run folder; where none is named, with the best design's rods and
+    without cables, as in a case file. Results go to `output`, those of a run else to its schedules.
+    Raises InputError for an unknown design, and as the readers of both."""
     if source.suffix.lower() != ".toml":
         run = read_run(source)
-        name = design_named(run, design, "unbraced")
+        name = design_named(run, design, run.best)
         return Scanned(
             run.shell_of(name),
-            run.designs[name],
+            run.without_cables(name) if design is None else run.designs[name],
             run.loads,
             run.case.surface.origin,
             make_folder(output or run.folder / "schedules"),

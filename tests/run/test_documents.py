@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 
 from shellform.case.case import load_case
-from shellform.errors import InputError
+from shellform.errors import InputError, NotConverged
 from shellform.output.workshop.schedules import TitleBlock
 from shellform.records.progress import Kind
 from shellform.records.stages import STAGES
 from shellform.records.summary import Summary
+from shellform.run import documents
 from shellform.run.documents import built_design, stock_length, write_documents
 from shellform.run.folder import Run
 from shellform.run.keys import stage_keys
+from shellform.structure.network import assemble
+from shellform.structure.solve.equilibrium import find_equilibrium
 
 ROOT = Path(__file__).parent.parent.parent
 CASE = ROOT / "scripts/scale_model.toml"
@@ -72,16 +75,32 @@ def test_all_documents_of_the_best_design_are_written_and_splices_are_said(run):
 def test_what_is_built_is_the_best_design_with_its_cables_hung_into_the_grid_before_bracing(run):
     words = ["cable.adjustment=0.01", "title_block.date=2026-05-31", "title_block.revision=B"]
     case = load_case(CASE, [*words, "title_block.author=A. Author", "surface.origin=[1.0, 2.0, 3.0]"])
-    states = {**run.states, "unbraced": {**run.states["initial"], "none": run.states["unbraced"]["design"]}}
-    built = built_design(replace(run, case=case, states=states))
-    assert (built.name, built.design, built.states) == (
-        "polished", run.designs["polished"], run.states["polished"],
-    )  # fmt: skip
-    assert built.hung is states["unbraced"]["none"]
+    # The rods of the end are thinner than those of the start, of which the run's unbraced state is.
+    best = replace(run.designs["polished"], radius=0.8 * run.designs["polished"].radius)
+    built = built_design(replace(run, case=case, designs={**run.designs, "polished": best}))
+    assert (built.name, built.design, built.states) == ("polished", best, run.states["polished"])
+    bare = replace(best, present=np.zeros(len(best.present), dtype=bool))
+    erected = find_equilibrium(
+        assemble(run.shell.network(bare)), run.shell.target, run.loads["none"], on_branch=True
+    ).state
+    np.testing.assert_allclose(built.hung.positions, erected.positions, atol=1e-7)
+    assert np.abs(erected.positions - run.states["unbraced"]["none"].positions).max() > 1e-4
     assert (built.adjustment, built.origin, built.title) == (0.01, (1.0, 2.0, 3.0), case.title)
     assert built.block == TitleBlock("2026-05-31", "B", "A. Author")
-    alone = {name: own for name, own in states.items() if name != "unbraced"}
-    assert built_design(replace(run, states=alone)).hung is None
+    # Nor does it take the run's unbraced design, which a case may leave out.
+    alone = {name: own for name, own in run.states.items() if name != "unbraced"}
+    assert built_design(replace(run, states=alone)).hung is not None
+
+
+def test_a_grid_that_comes_to_no_rest_without_cables_is_told_and_its_cables_are_hung_into_the_target(
+    run, monkeypatch
+):
+    def astray(*_):
+        raise NotConverged("It went astray", remedy="Try others.")
+
+    monkeypatch.setattr(documents, "follow", astray)
+    assert built_design(run).hung is None
+    assert any("doesn't come to rest" in note for note in write_documents(run).notes)
 
 
 def test_a_folder_in_which_nothing_can_be_written_is_named(run, tmp_path):

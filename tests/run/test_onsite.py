@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from shellform.case.case import load_case
 from shellform.errors import InputError
-from shellform.run import onsite
+from shellform.run import onsite, site_sources
 from shellform.run.folder import read_run
 from shellform.run.run import run_case
 from shellform.site import measurements
@@ -106,10 +106,46 @@ def test_a_survey_becomes_turns_for_the_crew_and_the_next_one_goes_on_from_there
     told = onsite.survey(
         folder,
         loose,
-        onsite.Survey(cables=25, largest=0.001, length_error=5e-4, after=tmp_path / "belief.npz"),
+        onsite.Survey(cables=25, largest=0.001, length_error=5e-4, after=tmp_path / "belief-1.npz"),
         tmp_path,
     )
     assert "176 nodes were seen" in told.lines[0]
+    # Told again, the second round is the same; the third goes on from what it left.
+    again = onsite.survey(
+        folder,
+        loose,
+        onsite.Survey(cables=25, largest=0.001, length_error=5e-4, after=tmp_path / "belief-1.npz"),
+        tmp_path,
+    )
+    assert (again.lines, again.files) == (told.lines, told.files)
+    assert [file.name for file in told.files] == ["turns.csv", "predicted.csv", "belief-2.npz"]
+    third = onsite.survey(folder, loose, onsite.Survey(after=tmp_path / "belief-2.npz"), tmp_path)
+    assert third.files[-1].name == "belief-3.npz"
+
+
+def test_a_survey_overwrites_nothing_that_it_reads_and_goes_on_from_beliefs_without_a_round(
+    folder, run, tmp_path
+):
+    crossings = run.shell.net.grid.crossing_nodes[:, 1]
+    seen = run.states["initial"]["none"].positions[crossings]
+    file = written(
+        tmp_path / "survey.csv", "x,crossing,y,z", [(x, k, y, z) for k, (x, y, z) in enumerate(seen)]
+    )
+    onsite.survey(folder, file, onsite.Survey(), tmp_path)
+    with np.load(tmp_path / "belief-1.npz") as kept:
+        old = {name: each for name, each in kept.items() if name != "round"}
+    before = (tmp_path / "predicted.csv").read_bytes()
+    for name, measured in (("belief-2.npz", file), ("belief.npz", tmp_path / "predicted.csv")):
+        np.savez(tmp_path / name, **old)
+        options = onsite.Survey(after=tmp_path / name)
+        with pytest.raises(InputError, match=r"would be overwritten.*another name.*another --output"):
+            onsite.survey(folder, measured, options, tmp_path)
+    assert (tmp_path / "predicted.csv").read_bytes() == before
+    # What it says to do does: another name, or another folder.
+    (tmp_path / "belief-2.npz").rename(tmp_path / "monday.npz")
+    told = onsite.survey(folder, file, onsite.Survey(after=tmp_path / "monday.npz"), tmp_path)
+    assert told.files[-1] == tmp_path / "belief-2.npz"
+    onsite.survey(folder, tmp_path / "predicted.csv", onsite.Survey(), tmp_path / "other")
 
 
 def test_the_loop_of_survey_and_turns_can_be_replayed_with_noise(folder, tmp_path):
@@ -237,6 +273,23 @@ def test_scans_become_connector_stiffness(folder, run, tmp_path):
     assert any(line.startswith("torsion = ") for line in told.lines)
 
 
+def test_a_calibration_takes_the_rods_that_were_built_before_their_cables_unless_a_design_is_named(
+    folder, run, monkeypatch, tmp_path
+):
+    start = run.designs["initial"]
+    built = replace(start, radius=0.8 * start.radius, rest_length=0.99 * start.rest_length)
+    monkeypatch.setattr(
+        site_sources, "read_run", lambda _: replace(run, designs={**run.designs, "polished": built})
+    )
+    for name, radius, cables in (
+        (None, built.radius, 0),
+        ("polished", built.radius, len(start.present)),
+        ("unbraced", start.radius, 0),
+    ):
+        taken = site_sources.scanned(folder, name, tmp_path, allow_scripts=False).design
+        assert (taken.radius, taken.present.sum()) == (radius, cables)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -330,7 +383,7 @@ def test_bad_options_are_refused(folder, tmp_path):
         onsite.survey(folder, good, onsite.Survey(unit="league"))
     foreign = tmp_path / "foreign.npz"
     np.savez(foreign, a=1)
-    with pytest.raises(InputError, match=r"not left by shellform survey.*belief\.npz"):
+    with pytest.raises(InputError, match=r"not left by shellform survey.*belief-1\.npz"):
         onsite.survey(folder, good, onsite.Survey(after=foreign))
     names = ("rest_length", "present", "radius", "covariance", "positions", "quaternions")
     np.savez(foreign, **dict.fromkeys(names, 1), origin="initial/wet")

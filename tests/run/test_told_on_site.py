@@ -95,7 +95,7 @@ def test_a_survey_tells_turns_and_how_far_the_grid_is_off_before_and_after(
     assert (first["node"], first["x"], last["z"]) == ("1", "1.000000", "1.004000")
     assert float(first["distance before [mm]"]) == pytest.approx(np.hypot(3.0, 20.0), abs=1e-3)
     assert float(first["distance after [mm]"]) == pytest.approx(4.0)
-    with np.load(tmp_path / "schedules/belief.npz") as kept:
+    with np.load(tmp_path / "schedules/belief-1.npz") as kept:
         assert str(kept["origin"]) == "polished/wet"
         np.testing.assert_array_equal(kept["positions"], now.state.positions)
 
