@@ -24,11 +24,11 @@ from shellform.errors import (
     require_known,
 )
 from shellform.gridshell.gridshell import Gridshell
-from shellform.quantities import PLACE_DEVIATION, TURN, newtons, number
+from shellform.quantities import PLACE_DEVIATION, TURN, newtons
+from shellform.run.erection_told import broken_told, off_design, scaffold_told
 from shellform.run.folder import Run, read_run
 from shellform.run.site_sources import design_named, load_named, scan_under, scanned
 from shellform.site import calibration, erection, measurements, retensioning
-from shellform.site.erection_steps import Props
 from shellform.site.scans import counted_alike
 from shellform.site.surveys import doubtful, read_survey
 from shellform.structure.elements.state import State
@@ -276,50 +276,11 @@ def erect(
             f"{1e-6 * last.stress:.0f} MPa in the end",
             f"largest cable tension {newtons(max(each.tension for each in done.steps))}, largest force on a "
             f"support {newtons(max(each.reaction for each in done.steps))}",
-            *([] if borne is None else [_scaffold(borne)]),
-            *([] if weight else _beside_design(run, name, load or "none", last.state)),
-            *([_broken(worst.stage, borne, tighten_first)] if worst.stress > done.strength else []),
+            *([] if borne is None else [scaffold_told(borne)]),
+            *([] if weight else off_design(run, name, load or "none", last.state)),
+            *([broken_told(worst.stage, borne, tighten_first)] if worst.stress > done.strength else []),
         ],
         files,
-    )
-
-
-def _beside_design(run: Run, design: str, load: str, state: State) -> list[str]:
-    """How far a shell that was erected ends from where its design lies; nothing of a load that the run
-    doesn't have."""
-    known = run.states[design].get(load)
-    if known is None:
-        return []
-    far = float(np.linalg.norm(state.positions - known.positions, axis=1).max())
-    under = "before any load" if load == "none" else f"under the load “{load}”"
-    return [f"in the end it lies up to {number(1e3 * far, 2)} mm from where the design does {under}"]
-
-
-def _broken(stage: str, borne: Props | None, tighten_first: bool) -> str:
-    """That rods break, most of all in a `stage`, and what helps: another way up only on the way up."""
-    when, helps = "on the way", "prop other crossings (--props)"
-    if stage == "loading":
-        when, helps = "under the load", "give a smaller --load"
-    elif stage.startswith("tightening"):
-        when, helps = (
-            "as cables are tightened",
-            "leave --tighten-first out" if tighten_first else "brace otherwise",
-        )
-    elif borne is None:
-        helps = "erect --by scaffold, give the supports other --way points"
-    return f"rods break {when}: {helps}, or choose thinner or stronger rods"
-
-
-def _scaffold(borne: Props) -> str:
-    """What a scaffold bears."""
-    held = (
-        f"holds up to {borne.pulled} of them down, where the grid would lift off, with up to {newtons(borne.pull)}"
-        if borne.pulled
-        else "holds none of them down"
-    )
-    return (
-        f"the scaffold pushes crossings up with up to {newtons(borne.push)} each and {held}; ropes draw rods' ends in "
-        f"with up to {newtons(borne.rope)}"
     )
 
 

@@ -368,10 +368,8 @@ def _named(file: Path, size: int, written: int) -> tuple[Path, ...]:
 def _place(file: Path, uri: str) -> Path | None:
     """Where a buffer's address leads from a scene's file; None out of its folder."""
     folder, named = file.parent.resolve(), unquote(uri)
-    if "\0" in named:
-        return None
-    place = (folder / named).resolve()
-    return place if place.is_relative_to(folder) else None
+    place = None if "\0" in named else (folder / named).resolve()
+    return place if place and place.is_relative_to(folder) else None
 
 
 def _placement(entry: dict[str, Any]) -> Reals:
