@@ -44,6 +44,7 @@ FLOORS = {
         ["readers.teeth"],
         ["readers.mend"],
         ["occ"],
+        ["imports"],
         ["cad"],
         ["readers"],
         ["funicular"],

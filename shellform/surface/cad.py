@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,8 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, NotConverged, require_file, require_number
-from shellform.surface.occ import errors, extent, gmsh, mesh_faces, session, silence, surface_from, to_sew
+from shellform.surface.imports import import_faces, sew
+from shellform.surface.occ import errors, extent, gmsh, mesh_faces, session, silence, surface_from
 from shellform.surface.readers.draft import Draft, require_mesh_size
 from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.script import function_of, load_script, named_dimensions
@@ -39,8 +41,6 @@ FORMATS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".b
 _DEFAULT_EDGES = 60.0  # along the longer plan extent
 _BUILT_EDGES = 90.0  # along the largest dimension of a builder script
 _SAMPLES = 33  # points on each edge curve that a fitted surface passes through
-# of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
-_SEWN = 1e-6
 _FITTED = 1000  # about as many vertices a fitted surface passes through
 _SEGMENTS = 100  # of a fitted B-spline along u and v
 _CORNER = np.cos(np.deg2rad(30.0))  # an edge that turns more has a corner there
@@ -109,7 +109,8 @@ def read_cad(
 
     The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis,
     and stays so; of a solid its "upper" or "lower" `face` is taken; `before_mesh` is told about how many
-    triangles there will be. Raises InputError for unreadable files, and for solids without a `face`.
+    triangles there will be. Raises InputError for unreadable files, for solids without a `face`, and with one
+    for solids beside surfaces.
     """
     if kind != "brep" and unit is not None:
         raise InputError(
@@ -127,12 +128,12 @@ def read_cad(
         )
     factor = {"step": unit_factor("mm"), "iges": 1.0, "brep": unit_factor(unit or "m")}[kind]
     with session(), errors(file, "gmsh can't read it", "Open it in a CAD program and export it anew."):
-        _read_shapes(file, kind)
-        _refuse_all_but_faces(file, kind, face)
+        left_out = import_faces(file, kind, face)
         if factor != 1.0:
             gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, factor, factor, factor)
         gmsh.model.occ.synchronize()
-        return _draft(file, size, up, face, before_mesh)
+        draft = _draft(file, size, up, face, before_mesh)
+    return replace(draft, notes=(*left_out, *draft.notes))
 
 
 def mesh_patches(
@@ -149,12 +150,7 @@ def mesh_patches(
         for patch in patches:
             _add_patch(patch)
         gmsh.model.occ.synchronize()
-        tolerance = _SEWN * float(extent().max())
-        if to_sew(tolerance):
-            # Of all shapes at once, which an empty list means: named ones are sewn each by itself, to
-            # nothing.
-            gmsh.model.occ.healShapes([], tolerance, False, False, False, True, False)
-            gmsh.model.occ.synchronize()
+        sew()
         return _draft(where, size, up, face, before_mesh)
 
 
@@ -340,53 +336,6 @@ def _stretches(edge: Reals) -> list[range]:
     return [
         range(a, b + 1) for a, b in zip(corners, np.append(corners[1:], corners[0] + len(edge)), strict=True)
     ]
-
-
-def _read_shapes(file: Path, kind: str) -> None:
-    """The file's shapes into the current model, STEP in mm, IGES in m, faces that touch sewn together.
-
-    With metres for its unit OpenCASCADE loses the seam of what turns about a pole and is less than some 2 m
-    wide in STEP files of millimetres."""
-    if kind == "step":
-        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
-    if kind == "iges":
-        # OpenCASCADE takes a target unit for IGES only once it has read one: this reading is thrown away.
-        gmsh.option.setString("Geometry.OCCTargetUnit", "")
-        _import(file, kind)
-        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-    _import(file, kind)
-    tolerance = _SEWN * float(extent().max())
-    if not gmsh.model.getEntities(3) and to_sew(tolerance):
-        # The sewing tolerance is a share of the size, which is known only now: read again.
-        gmsh.option.setNumber("Geometry.Tolerance", tolerance)
-        gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
-        _import(file, kind)
-
-
-def _import(file: Path, kind: str) -> None:
-    gmsh.model.remove()
-    gmsh.model.add("surface")
-    with silence():
-        gmsh.model.occ.importShapes(str(file), highestDimOnly=True, format=kind)
-    gmsh.model.occ.synchronize()
-
-
-def _refuse_all_but_faces(file: Path, kind: str, face: str | None) -> None:
-    if gmsh.model.getEntities(3) and face is None:
-        remedy = (
-            "Choose its upper or lower face (surface.face, --face), or export that face alone, as a surface."
-        )
-        raise InputError("holds a solid", where=str(file), remedy=remedy)
-    if not gmsh.model.getEntities():
-        raise InputError(
-            f"holds nothing that can be read as {kind.upper()}",
-            where=str(file),
-            remedy="Open it in a CAD program and export it anew.",
-        )
-    if not gmsh.model.getEntities(2):
-        raise InputError(
-            "holds no surface, only points or curves", where=str(file), remedy="Export the surface."
-        )
 
 
 def _on_edge(triangles: Indices, count: int) -> Flags:

@@ -246,6 +246,29 @@ def test_a_solid_is_refused_without_a_choice_of_face_and_read_with_one(tmp_path)
         read_surface(file, face="outer")
 
 
+@pytest.mark.parametrize("ending", ["step", "brep"])
+def test_a_surface_beside_solids_is_taken_and_a_face_of_one_or_the_other_refused(tmp_path, ending):
+    """Two squares that touch, beside a block, with a line and a point far away."""
+    script = tmp_path / "both.py"
+    script.write_text(
+        "def build(gmsh, *, side=1.0):\n"
+        "    occ = gmsh.model.occ\n"
+        "    occ.addBox(5 * side, 0, 0, side, side, 2 * side)\n"
+        "    occ.addRectangle(0, 0, 1, side, side)\n"
+        "    occ.addRectangle(side, 0, 1, side, side)\n"
+        "    far = [occ.addPoint(x * side, 0, 0) for x in (50, 60, 90)]\n"
+        "    occ.addLine(*far[:2])\n"
+    )
+    file = tmp_path / f"both.{ending}"
+    cad.write_cad(file, script)
+    surface = read_surface(file)
+    assert surface.area == pytest.approx(2.0)
+    np.testing.assert_allclose(surface.size, [2.0, 1.0, 0.0], atol=1e-9)
+    assert len(surface.triangles) > 2000  # of a sixtieth of the surface's plan, and not of all that is there
+    assert any("it holds 1 solid and 2 surfaces: solids were left out" in note for note in surface.mended)
+    refused(file, "holds 1 solid and 2 surfaces", "Leave the face out", face="upper")
+
+
 def test_two_shells_in_a_cad_file_are_refused_or_chosen_from(tmp_path):
     script = tmp_path / "two.py"
     script.write_text(
