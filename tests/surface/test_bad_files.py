@@ -269,6 +269,17 @@ def test_a_surface_beside_solids_is_taken_and_a_face_of_one_or_the_other_refused
     refused(file, "holds 1 solid and 2 surfaces", "Leave the face out", face="upper")
 
 
+@pytest.mark.parametrize("ending", ["step", "iges", "brep"])
+@pytest.mark.parametrize(("setting", "entry"), [("layer", "surface.layer"), ("name", "surface.object")])
+def test_layers_and_objects_of_cad_files_are_refused(tmp_path, ending, setting, entry):
+    script = tmp_path / "one.py"
+    script.write_text("def build(gmsh, *, side=1.0): gmsh.model.occ.addRectangle(0, 0, 0, side, side)\n")
+    file = tmp_path / f"one.{ending}"
+    cad.write_cad(file, script)
+    with pytest.raises(InputError, match=rf"{entry}.*no layers and names are read.*roof.*--piece"):
+        read_surface(file, **{setting: "roof"})
+
+
 def test_two_shells_in_a_cad_file_are_refused_or_chosen_from(tmp_path):
     script = tmp_path / "two.py"
     script.write_text(

@@ -161,6 +161,7 @@ def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
     if _LIBRARIES[kind] == "gmsh":
         from shellform.surface import cad
 
+        _refuse_choice(file, choice)
         return cad.read_cad(file, kind, **meshed)
     if kind == "3dm":
         from shellform.surface.readers import rhino
@@ -181,6 +182,18 @@ def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
     from shellform.surface.readers import vtkfiles
 
     return vtkfiles.read_vtk(file, choice, kind)
+
+
+def _refuse_choice(file: Path, choice: Choice) -> None:
+    """Raises InputError where a layer or an object of a CAD file is asked for: gmsh tells neither."""
+    for entry, wanted in (("surface.layer", choice.layer), ("surface.object", choice.name)):
+        if wanted:
+            raise InputError(
+                f"of a CAD file like {file} no layers and names are read",
+                where=entry,
+                value=wanted,
+                remedy="Leave it out; of separate surfaces one is chosen by surface.piece (--piece).",
+            )
 
 
 def _limit_memory() -> None:
