@@ -14,8 +14,8 @@ are Gauss-Newton's within a trust region (SciPy's `least_squares`). All equilibr
 a trial that leaves it counts as worse, and load states that the start doesn't bear come in when the others
 have been fitted. After a fit the points are laid and named anew, until nothing changes.
 
-Parameters that the data don't tell (identifiability.py) are held at their start values, and it is said so;
-connectors of the scale model are so short and stiff along their axis that their EA is always among these.
+Parameters that the data don't tell (identifiability.py) are held, at their start values or where rounds
+before have brought them, and it is said so; connectors of the scale model are so short that EA always is.
 """
 
 from __future__ import annotations
@@ -78,7 +78,8 @@ class Calibration(Record):
         """What was found, held and doubted."""
         result = [f"{name} = {getattr(self.joint, name):.4g}" for name in self.fitted]
         result += [
-            f"{name} was held at its start value, {getattr(self.joint, name):.4g}." for name in self.held
+            f"{name} was held at {getattr(self.joint, name):.4g}, which the data don't tell."
+            for name in self.held
         ]
         result += self.identifiability.sentences()
         for number, each in enumerate(self.matches, 1):
