@@ -299,7 +299,8 @@ def test_the_turn_of_connectors_divides_by_no_torsion_of_locks(shells, solved):
 def test_erection_slides_and_the_load_finds_locked_rods(shells):
     found, load = shells
     loose, locked = (
-        erect(found[name], found[name].design(), load=load, step=0.5) for name in ("loose", "locked")
+        erect(found[name], found[name].design(), by="supports", load=load, step=0.5)
+        for name in ("loose", "locked")
     )
     assert [each.stage for each in loose.steps].count("loading") == 2
     for one, other in zip(loose.steps, locked.steps, strict=True):

@@ -303,6 +303,7 @@ def test_while_cables_are_taken_away_only_those_that_pull_and_stay_are_kept_taut
     monkeypatch.setattr(phases, "_repaired", repaired)
     monkeypatch.setattr(phases, "_made_to_stand", lambda search, it, trial, budget: (trial, it))
     monkeypatch.setattr(phases, "stiffness_of", lambda *_: 0.0)
+    monkeypatch.setattr(phases, "taut_count", lambda *_: 2)
     none = np.zeros(5, dtype=bool)
     start = standing_at(Point(1.0, "start"), tensioned=none, needed=none, thrifty=2.0, batch=2)
     search = searching(models=SimpleNamespace(at=lambda point: model))

@@ -131,10 +131,13 @@ def test_of_the_shape_as_built_the_median_the_worst_and_what_drives_it_are_told(
         assert [each.deviation_max for each in shapes[:4]] == pytest.approx(far.max(axis=1), abs=1e-8)
         assert [each.deviation_mean for each in shapes[:4]] == pytest.approx(far.mean(axis=1), abs=1e-8)
         assert len(shapes) == count
-        assert told.structures == 4, "those of the designs that are compared, for each the same"
-        assert told.deviation_max == pytest.approx(np.median(far.max(axis=1)), abs=1e-8)
-        assert told.deviation_max_worst == pytest.approx(far.max(), abs=1e-8)
-        assert told.deviation_mean == pytest.approx(np.median(far.mean(axis=1)), abs=1e-8)
+        assert told.structures == count, "of up to twenty structures all that were drawn"
+        largest_of = [each.deviation_max for each in shapes]
+        assert told.deviation_max == pytest.approx(np.median(largest_of), abs=1e-8)
+        assert told.deviation_max_worst == pytest.approx(max(largest_of), abs=1e-8)
+        assert told.deviation_mean == pytest.approx(
+            np.median([each.deviation_mean for each in shapes]), abs=1e-8
+        )
         assert told.deviation_max > design.loads["design"].deviation_max
         assert set(told.causes) == set(tolerances.causes)
 
