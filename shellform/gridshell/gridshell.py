@@ -116,8 +116,7 @@ _OF_JOINTS = {"axial": AXIAL, "torsion": FLEXURAL, "bending": FLEXURAL, "gap": G
 @dataclass(frozen=True)
 class Joint:
     """The connection of two crossing rods, a short beam between their axes: EA, N; GJ and EI, N·m²; length
-    `gap`, m.
-    """
+    `gap`, m."""
 
     axial: float
     torsion: float
@@ -158,6 +157,10 @@ class Design(Record):
         put = object.__setattr__
         put(self, "present", flags("present", self.present, (None,)))
         put(self, "rest_length", reals("rest_length", self.rest_length, (len(self.present),), positive=True))
+
+    def unbraced(self) -> Design:
+        """The same without cables: its rods as they stand before they are braced."""
+        return replace(self, present=np.zeros(len(self.present), dtype=bool))
 
     def among_candidates(self, values: Reals) -> Reals:
         """Values (..., p) of the present cables among those of all candidates (..., c); 0 for absent ones."""
@@ -216,8 +219,7 @@ class Gridshell(Record):
         return self.net.node_count
 
     def locked_in(self, state: State) -> Gridshell:
-        """The same with its rods, if they have two layers, locked without stress in a `state` instead of on
-        the target."""
+        """The same, its rods, if in two layers, locked without stress in a `state` instead of the target."""
         other = copy.copy(self)
         object.__setattr__(other, "_locks", locks(self.net, self.rod.section, state))
         object.__setattr__(other, "_made", {})
@@ -238,7 +240,7 @@ class Gridshell(Record):
 
     def unbraced(self) -> Design:
         """The design without cables."""
-        return replace(self.design(), present=np.zeros(len(self.cable_ends), dtype=bool))
+        return self.design().unbraced()
 
     def point_load(self, force: float, *, every: int = 1, openings: Sequence[ArrayLike] = ()) -> Reals:
         """Dead load (n, 6): `force` N downwards on every `every`-th crossing outside the plan polygons

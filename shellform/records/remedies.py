@@ -17,10 +17,8 @@ from shellform.records.thicker_rods import ThickerRodsRecord
 
 _CLOSER = 0.8  # of the spacing, where rods may not become thicker
 _EQUAL = 1e-9  # relative: radii that count as equal
-_TURNS, _LEAST = (
-    100,
-    0.5,
-)  # of the radius: rods that would have to be thinner than that aren't the same shell's
+_TURNS = 100  # towards the radius that does
+_LEAST = 0.5  # of the radius: rods that would have to be thinner than that aren't the same shell's
 _MOST = 100.0  # times the load: what lacks so much isn't mended by thicker rods
 
 

@@ -36,7 +36,7 @@ def built_design(run: Run) -> Built:
         shell=shell,
         design=run.designs[run.best],
         states=run.states[run.best],
-        hung=_erected(shell, run.without_cables(run.best)),
+        hung=_erected(shell, run.designs[run.best].unbraced()),
         name=run.best,
         title=run.case.title,
         adjustment=run.case.cable.adjustment,

@@ -135,7 +135,7 @@ def _erection(run: Run, name: str, wish: Wish, report: Report) -> list[Any]:
     slack = np.maximum(
         np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1), design.rest_length
     )  # as erection.py begins to tighten them
-    none = replace(design, present=np.zeros(len(design.present), dtype=bool))
+    none = design.unbraced()
     panels: list[Any] = []
     for number, step in enumerate(steps):
         tightened = step.share if step.stage == "tightening" else 1.0

@@ -14,8 +14,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 import shellform
 from shellform.arrays import Reals, Record, read_arrays
 from shellform.case.build_gridshell import gridshell, rounding_catalogue
@@ -91,12 +89,6 @@ class Run(Record):
             for name in ("unbraced", "initial", "optimised", "rounded", "polished")
             if name in self.designs
         ][-1]
-
-    def without_cables(self, name: str) -> Design:
-        """A design without its cables: the grid of its rods as it stands before it is braced. The run's
-        "unbraced" is that of the rods at the start."""
-        design = self.designs[name]
-        return replace(design, present=np.zeros(len(design.present), dtype=bool))
 
     def shell_of(self, name: str) -> Gridshell:
         """The shell with the rods of a design: those of a rounded one come from the catalogue."""

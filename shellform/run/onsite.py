@@ -340,10 +340,9 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
 
 def _refuse_overwriting(files: Sequence[Path], read: Sequence[Path | None]) -> None:
     """Raises InputError where what is read would be overwritten: told again, the round would be another."""
+    there = [file for file in files if file.exists()]
     for each in read:
-        if each is not None and any(
-            file.exists() and each.exists() and file.samefile(each) for file in files
-        ):
+        if each is not None and each.exists() and any(map(each.samefile, there)):
             raise InputError(
                 "is read and would be overwritten",
                 where=str(each),

@@ -41,7 +41,7 @@ def scanned(source: Path, design: str | None, output: Path | None, *, allow_scri
         name = design_named(run, design, run.best)
         return Scanned(
             run.shell_of(name),
-            run.without_cables(name) if design is None else run.designs[name],
+            run.designs[name].unbraced() if design is None else run.designs[name],
             run.loads,
             run.case.surface.origin,
             make_folder(output or run.folder / "schedules"),

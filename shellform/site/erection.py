@@ -86,18 +86,17 @@ def erect(
     )
     teams = _teams(design, groups)
     locked, shell = shell, _sliding(shell)
-    unbraced = replace(design, present=np.zeros(len(design.present), dtype=bool))
+    unbraced = design.unbraced()
     now = replace(design, rest_length=np.maximum(_SLACK * shell.cable_lengths, design.rest_length))
     scaffold = Scaffold(shell, unbraced, own, props, step) if by == SCAFFOLD else None
     if scaffold is None:
-        site, free = Site(shell, unbraced), Site(shell, now)
-        state, braced = _erected(site, own), free
+        site, braced = Site(shell, unbraced), Site(shell, now)
+        state = _erected(site, own)
         steps = _taken_down(site, state, way, carried, own, step)
     else:
         steps = scaffold.up()
-        scaffold.shell = locked.locked_in(steps[-1].state)
-        free = scaffold.standing(now)
-        braced = scaffold.site(now) if tighten_first else free
+        scaffold = scaffold.under(locked.locked_in(steps[-1].state))
+        braced = scaffold.site(now) if tighten_first else scaffold.standing(now)
         if not tighten_first:
             steps += scaffold.taken_away(unbraced, steps[-1].state, braced_later=len(teams) > 0)
         state = steps[-1].state

@@ -23,6 +23,7 @@ target, is gone backwards: stable equilibria are the same both ways.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -104,6 +105,12 @@ class Scaffold:
         bending = min(shell.rod.resized(unbraced.radius).stiffness.bending)
         self.resistance = 12.0 * bending / net.grid.scale**3
         self.slight = _SLIGHT * self.resistance * net.grid.scale
+
+    def under(self, shell: Gridshell) -> Scaffold:
+        """The same scaffold under the shell as it is once something has been built into it."""
+        other = copy.copy(self)
+        other.shell = shell
+        return other
 
     def up(self) -> list[ErectionStep]:
         """Steps from the flat grid to the one that lies on the scaffold with its ends in place. Raises

@@ -48,9 +48,9 @@ def test_broken_off_it_goes_on_with_the_factors_that_are_known(dome, nominal):
 def test_the_cause_that_alone_matters_has_the_largest_share(dome, nominal):
     workshop = Workshop(perfect(dome, dome.design(), 1.1 * nominal.load))
     errors = Tolerances(load_all=0.1, connectors=1e-6)
-    found = rare_failure(workshop, errors, seed=0, count=60, most=1.5)
+    found = rare_failure(workshop, errors, seed=0, count=100, most=1.5)
     assert found.found.probability > 0.0
-    assert found.shares["load_all"] > 0.7, "the rest is chance of some forty connectors"
+    assert found.shares["load_all"] > 0.8
 
 
 def test_causes_share_the_squared_distance_of_the_failures_mean_less_what_chance_leaves_of_each_variable():

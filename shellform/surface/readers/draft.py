@@ -148,9 +148,8 @@ def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:
             remedy="Export a coarser mesh.",
         )
     whole = np.vstack(points)
-    others = np.zeros(
-        len(whole), dtype=bool
-    )  # points of objects left out alone: no loose ones, of which notes tell
+    # What is left out alone has points that are no loose ones, of which notes would tell.
+    others = np.zeros(len(whole), dtype=bool)
     for part, meant in zip(parts, chosen, strict=True):
         if not meant and id(part.points) in begins:
             for block in part.faces:

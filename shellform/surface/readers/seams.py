@@ -10,6 +10,7 @@ without gives its long side to its neighbour, or goes where that lies on the edg
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -38,18 +39,9 @@ def sewn(draft: Draft, size: float) -> Draft:
         return draft
     length = np.linalg.norm(draft.points[rim[:, 1]] - draft.points[rim[:, 0]], axis=1)
     reach = min(_GAP * float(length.mean()), _MOST_GAP * size)
-    joined, gap = 0, 0.0
-    for _ in range(_ROUNDS):  # each vertex once a round: where several patches meet, then pairs of pairs
-        draft, more, away = _vertices_joined(draft, reach)
-        joined, gap = joined + more, max(gap, away)
-        if not more:
-            break
-    cut, off = 0, 0.0
-    for _ in range(_ROUNDS):
-        draft, more, away = _edges_cut(draft, reach)
-        cut, off = cut + more, max(off, away)
-        if not more:
-            break
+    # each vertex once a round: where several patches meet, then pairs of pairs
+    draft, joined, gap = _in_rounds(_vertices_joined, draft, reach)
+    draft, cut, off = _in_rounds(_edges_cut, draft, reach)
     notes = draft.notes
     if joined:
         notes = (
@@ -73,6 +65,19 @@ def open_edges(triangles: Indices) -> Indices:
     edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     _, at, counts = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     return np.asarray(edges[at[counts == 1]])
+
+
+def _in_rounds(
+    close: Callable[[Draft, float], tuple[Draft, int, float]], draft: Draft, reach: float
+) -> tuple[Draft, int, float]:
+    """The draft after as many rounds as close something, how often in all, and the farthest, m."""
+    count, far = 0, 0.0
+    for _ in range(_ROUNDS):
+        draft, more, away = close(draft, reach)
+        count, far = count + more, max(far, away)
+        if not more:
+            break
+    return draft, count, far
 
 
 def _vertices_joined(draft: Draft, reach: float) -> tuple[Draft, int, float]:
