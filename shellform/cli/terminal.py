@@ -110,6 +110,7 @@ def tell_as_built(summary: Summary) -> None:
         built_shape_words,
         cause_title,
         critical_words,
+        fallen_at,
         goes_slack_words,
         rare_words,
         shape_notes,
@@ -142,7 +143,7 @@ def tell_as_built(summary: Summary) -> None:
         slack = goes_slack_words(found.cables)
         cables = f"; {slack}" if slack else ""
         print(
-            f"fails first: structure {found.number} at {found.factor:.2f} of the load “{found.load}” ({found.kind}), "
+            f"fails first: structure {found.number} at {fallen_at(found.factor)} of the load “{found.load}” ({found.kind}), "
             f"driven by {cause_title(found.driver)}, without which it bears {found.without[found.driver]:.2f}{cables}"
         )
     for rare in summary.rare or ():

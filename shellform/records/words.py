@@ -80,6 +80,12 @@ def constraint_titles(names: Iterable[str]) -> dict[str, str]:
     return titles
 
 
+def fallen_at(factor: float) -> str:
+    """The load factor at which a structure falls, to a thousandth where a hundredth would say that it bears
+    its load."""
+    return f"{factor:.3f}" if f"{factor:.2f}" == "1.00" else f"{factor:.2f}"
+
+
 def standing_words(own: StandingRecord) -> str:
     """How many structures as built stand, and how sure that is."""
     return f"{standing_count_words(own)} ({confidence_words(own)})"

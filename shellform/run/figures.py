@@ -19,6 +19,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import rod_forces
 from shellform.records import history
 from shellform.records.progress import Event, Kind, Report, unheard
+from shellform.records.words import fallen_at
 from shellform.run.folder import Run, figures_folder, read_run
 from shellform.run.scales import colour_limit, force_limit
 from shellform.structure.elements.state import State
@@ -219,7 +220,7 @@ def draw_failure(run: Run) -> list[Path]:
         run.designs[told.design],
         State(data["positions"], data["quaternions"]),
         load=run.loads[told.load],
-        title=f"{told.design} design, structure {told.number} as it fails at {told.factor:.2f} of {_LOADS.get(told.load, told.load)}",
+        title=f"{told.design} design, structure {told.number} as it fails at {fallen_at(told.factor)} of {_LOADS.get(told.load, told.load)}",
     )
     make_folder(file.parent)
     panel = maps.drawn_out(panel, data["mode"][:, :3])

@@ -606,3 +606,9 @@ def test_one_cable_goes_slack_and_several_go():
     assert words.goes_slack_words(("C5",)) == "C5 goes slack"
     assert words.goes_slack_words(("C3", "C12")) == "C3, C12 go slack"
     assert words.goes_slack_words(()) == ""
+
+
+def test_what_falls_is_never_told_to_fall_at_the_whole_load():
+    assert [words.fallen_at(factor) for factor in (0.873, 0.9, 0.9944, 0.997, 0.99902)] == [
+        "0.87", "0.90", "0.99", "0.997", "0.999",
+    ]  # fmt: skip
