@@ -32,7 +32,7 @@ from numba.core.caching import IndexDataCacheFile
 
 from shellform.work_clock import Work, WorkClock, listener
 
-__all__ = ["clock_without_compiling", "njit", "prange", "set_num_threads"]
+__all__ = ["clock_without_compiling", "is_kept", "njit", "prange", "set_num_threads"]
 
 _WHOLE = "one to one and a half minutes of a free core in all"  # 94 s of processor time, measured once beside other work
 _FIRST_TOLD = 10.0  # s of compiling
@@ -100,6 +100,11 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         return found
 
     return compiled
+
+
+def is_kept(function: Any) -> bool:
+    """Whether the cache holds a compiled function as it is written now, for arguments of any kind."""
+    return bool(function._cache._cache_file._load_index())
 
 
 class _Entry(IndexDataCacheFile):  # type: ignore[misc]

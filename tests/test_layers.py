@@ -49,7 +49,14 @@ FLOORS = {
         ["readers"],
         ["funicular"],
     ],
-    "shellform.structure": [["elements", "refusals"], ["solve"], ["network"], ["model"], ["answers"]],
+    "shellform.structure": [
+        ["elements", "refusals"],
+        ["solve"],
+        ["network"],
+        ["model"],
+        ["answers"],
+        ["ahead"],
+    ],
     "shellform.output": [["pictures"], ["workshop"], ["exchange"], ["frames"], ["page"], ["notebook"]],
 }
 # Behind which module each library lies. Of VTK two parts are used for two things that have no line in

@@ -48,20 +48,22 @@ def design(
     """
     from shellform.case.case import load_case
     from shellform.run.run import run_case
+    from shellform.structure.ahead import compiling_ahead
 
     def once(ending: Callable[[Report], Report] = lambda report: report) -> Summary:
         spinner = Spinner(quiet=quiet)
         try:
-            summary = run_case(
-                load_case(case, settings or ()),
-                output,
-                until=until,
-                fresh=fresh,
-                allow_scripts=allow_scripts,
-                profile=profile,
-                sketch=sketch,
-                report=ending(spinner),
-            )
+            with compiling_ahead():
+                summary = run_case(
+                    load_case(case, settings or ()),
+                    output,
+                    until=until,
+                    fresh=fresh,
+                    allow_scripts=allow_scripts,
+                    profile=profile,
+                    sketch=sketch,
+                    report=ending(spinner),
+                )
         finally:
             spinner.close()
         if as_json:

@@ -50,18 +50,20 @@ def new(
     """Design a shell that stands and write its commented case file."""
     from shellform.run.propose import propose_case
     from shellform.run.sizes import DesignWish
+    from shellform.structure.ahead import compiling_ahead
 
     report = Spinner(quiet=quiet)
     try:
-        told = propose_case(
-            surface,
-            output,
-            surface_options,
-            allow_scripts=allow_scripts,
-            wish=DesignWish(rod, spacing, thickness, angle, layers, edges),
-            way_out=way_out,
-            report=report,
-        )
+        with compiling_ahead():
+            told = propose_case(
+                surface,
+                output,
+                surface_options,
+                allow_scripts=allow_scripts,
+                wish=DesignWish(rod, spacing, thickness, angle, layers, edges),
+                way_out=way_out,
+                report=report,
+            )
     finally:
         report.close()
     if not quiet:
