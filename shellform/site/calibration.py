@@ -14,8 +14,8 @@ are Gauss-Newton's within a trust region (SciPy's `least_squares`). All equilibr
 a trial that leaves it counts as worse, and load states that the start doesn't bear come in when the others
 have been fitted. After a fit the points are laid and named anew, until nothing changes.
 
-Parameters that the data don't tell (identifiability.py) are held, at their start values or where rounds
-before have brought them, and it is said so; connectors of the scale model are so short that EA always is.
+Parameters that the data don't tell (identifiability.py) are held, at their start values or where fits have
+brought them, and it is said so; connectors of the scale model are so short that EA always is.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from shellform.arrays import Indices, Reals, Record, indices, reals
+from shellform.arrays import Indices, Reals, Record, reals
 from shellform.errors import InputError, NotConverged, require_known, require_number
 from shellform.gridshell.gridshell import Design, Gridshell, Joint
 from shellform.net.grid import CONNECTOR
 from shellform.problem.paths import follow
 from shellform.site.identifiability import Identifiability, identifiability, nuisance
-from shellform.site.markers import Markers, markers_of
+from shellform.site.markers import Markers, marked, markers_of
 from shellform.site.measurements import check_noise
 from shellform.site.scans import Match, Scan, apart, distances, laid
 from shellform.structure.answers.sensitivity import by_stiffness, respond, state_by_design, stiffness_rate
@@ -54,7 +54,7 @@ _SETTLED = 1e-5  # relative change of the residual norm or of the logarithms at 
 
 @dataclass(frozen=True, eq=False)
 class Calibration(Record):
-    """The calibrated `joint`; which parameters were `fitted` and which `held` at the start.
+    """The calibrated `joint`; which parameters were `fitted` and are told by the data, and which are `held`.
     `identifiability`: what the data tell, with the noise or the residuals, whichever are larger. `markers`
     (m,) with their names; `matches` of the scans (s). `before`, `after` (m, s), m: distances of markers from
     the model with the start's and the calibrated joint, NaN where missing; `residual`, m: a coordinate's
@@ -122,7 +122,7 @@ def foresee(
     """What scans of the `nodes` (m,) under the `loads`, (n, 6) each, would tell about all three stiffnesses,
     at their present values: choose load states with it before anything is measured. Raises NotConverged where
     a load isn't borne on the stable branch."""
-    markers = _checked(shell, nodes)
+    markers = marked(shell.node_count, nodes)
     check_noise(noise)
     model = _Model(shell, design, loads)
     begun = model.begin(shell.joint)
@@ -154,7 +154,7 @@ def calibrate(
     Raises InputError where points can't be named, NotConverged where a load isn't borne on the stable branch
     or where nothing can be told.
     """
-    markers = _checked(shell, nodes)
+    markers = marked(shell.node_count, nodes)
     check_noise(noise)
     if reach is not None:
         require_number(reach, above=0.0, where="calibrate.reach", give="metres, such as half the spacing")
@@ -191,11 +191,13 @@ def calibrate(
     )
     fit = _Fit(model, joint, states, scans, matches, markers, offsets)
     deviation = fit.deviation(len(fitted))
+    known = fit.identifiability(first, max(noise, deviation))
+    told = tuple(name for name in fitted if name in known.tellable)
     return Calibration(
         joint=joint,
-        fitted=fitted,
-        held=tuple(name for name in first if name not in fitted),
-        identifiability=fit.identifiability(first, max(noise, deviation)),
+        fitted=told,
+        held=tuple(name for name in first if name not in told),
+        identifiability=known,
         markers=markers_of(shell.net.grid, markers),
         matches=tuple(matches),
         before=before,
@@ -362,12 +364,13 @@ class _Fit:
             accepted = states
             return self.jacobian(self._joint(q, names), states, names)[0]
 
-        size = len(names)
+        start = np.array([getattr(self.model.shell.joint, name) for name in names])
+        begun = np.log(start / [getattr(self.joint, name) for name in names])
         found = least_squares(
             value,
-            np.zeros(size),
+            np.clip(0.0, begun - _RANGE, begun + _RANGE),
             slope,
-            bounds=(np.full(size, -_RANGE), np.full(size, _RANGE)),
+            bounds=(begun - _RANGE, begun + _RANGE),
             xtol=_SETTLED,
             ftol=_SETTLED**2,
             gtol=None,
@@ -389,12 +392,3 @@ class _Fit:
 
     def _projected(self, columns: Reals) -> Reals:
         return np.asarray(columns - self.basis @ (self.basis.T @ columns))
-
-
-def _checked(shell: Gridshell, nodes: Indices) -> Indices:
-    markers = indices("nodes", nodes, (None,), below=shell.node_count)
-    if len(np.unique(markers)) < len(markers):
-        raise InputError(
-            "a node is marked twice", where="nodes", remedy="Give each marker a node of its own."
-        )
-    return markers

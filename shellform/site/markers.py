@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Indices, Record
+from shellform.arrays import Indices, Record, indices
+from shellform.errors import InputError
 from shellform.net.grid import Grid, rod_names
 
 
@@ -48,3 +49,14 @@ def markers_of(grid: Grid, nodes: Indices) -> Markers:
         rod[each.nodes] = k
     names = rod_names(grid)
     return Markers(nodes, crossing[nodes], tuple(names[k] for k in rod[nodes].tolist()))
+
+
+def marked(node_count: int, nodes: Indices) -> Indices:
+    """The numbers `nodes` (m,) of markers on a grid of so many nodes. Raises InputError where a number isn't
+    one of theirs or comes twice."""
+    markers = indices("nodes", nodes, (None,), below=node_count)
+    if len(np.unique(markers)) < len(markers):
+        raise InputError(
+            "a node is marked twice", where="nodes", remedy="Give each marker a node of its own."
+        )
+    return markers

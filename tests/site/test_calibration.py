@@ -101,6 +101,21 @@ def test_planted_connector_stiffness_is_recovered_within_2_percent_from_42_shuff
     )
 
 
+def test_a_stiffness_that_the_data_don_t_tell_once_it_is_fitted_is_not_said_to_be_found(
+    shell, loads, markers, monkeypatch
+):
+    rigid = replace(shell, joint=replace(shell.joint, torsion=300.0 * shell.joint.torsion))
+    begun = calibration._Model(rigid, shell.unbraced(), loads[:3]).begin(rigid.joint)
+    scans = scanned([each.equilibrium.state for each in begun], loads[:3], markers, 5)
+    monkeypatch.setattr(calibration, "_ROUNDS", 1)
+    found = calibrate(shell, shell.unbraced(), scans, markers)
+    assert found.joint.torsion > 10.0 * shell.joint.torsion
+    assert "torsion" not in found.identifiability.tellable
+    assert found.fitted == ("bending",)
+    assert found.held == ("axial", "torsion")
+    assert not any(each.startswith("torsion =") for each in found.sentences())
+
+
 def test_the_derivative_of_positions_by_stiffness_is_that_of_re_solved_equilibria(shell, loads, truth):
     model = calibration._Model(shell, shell.unbraced(), loads[1:2])
     rates = model.jacobian(shell.joint, truth[1:2], ("torsion", "bending"))[0, :, :3]

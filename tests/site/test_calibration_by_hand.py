@@ -39,6 +39,7 @@ class Model:
 
     def __init__(self):
         self.trials = 0
+        self.shell = SimpleNamespace(joint=JOINT)
 
     def states(self, joint):
         q = np.log([joint.torsion / JOINT.torsion, joint.bending / JOINT.bending])
@@ -52,14 +53,14 @@ class Model:
         return RATES[..., [("torsion", "bending").index(name) for name in names]]
 
 
-def fit(truth, noise=0.0, frame=None, hidden=False):
+def fit(truth, noise=0.0, frame=None, hidden=False, begun=JOINT):
     model = Model()
     points = [each.positions + noise for each in model.states(truth)]
     if hidden:
         points[1][2] = np.nan
     matches = [SimpleNamespace(places=lambda given: given)] * 2
     scans = [SimpleNamespace(points=each, frame=frame) for each in points]
-    return calibration._Fit(model, JOINT, model.states(JOINT), scans, matches, np.arange(4), False)
+    return calibration._Fit(model, begun, model.states(begun), scans, matches, np.arange(4), False)
 
 
 @pytest.mark.parametrize("bending", [9.0, 2.0, 14.9])
@@ -72,6 +73,14 @@ def test_stiffnesses_are_found_by_their_logarithms_and_others_stay(bending):
     joint, _ = fit(sf.Joint(axial=100.0, torsion=3.1, bending=5.0, gap=0.01)).solve(("torsion",))
     assert joint.torsion == pytest.approx(3.1, rel=1e-6)
     assert joint.bending == 5.0
+
+
+def test_a_stiffness_is_sought_up_to_a_thousand_times_that_of_the_start_however_often_it_is_fitted():
+    far = sf.Joint(axial=100.0, torsion=1e8, bending=2.0, gap=0.01)
+    once, _ = fit(far).solve(("torsion",))
+    assert once.torsion == pytest.approx(1e3 * JOINT.torsion, rel=1e-3)
+    again, _ = fit(far, begun=once).solve(("torsion",))
+    assert again.torsion == pytest.approx(1e3 * JOINT.torsion, rel=1e-3)
 
 
 def test_the_deviation_of_a_coordinate_is_that_of_the_residuals_over_what_is_left_to_them():
