@@ -86,7 +86,7 @@ def checks(
         *judged.under(
             "Rods",
             "stress up to 100 % of the strength",
-            _if_standing(lambda row, rods: _stressed(_stress(row), rods)),
+            _if_standing(_strained),
             loads,
         ),
         *_of_edge_beams(judged),
@@ -133,12 +133,12 @@ def _deviating(judged: _Judged, bounds: Bounds) -> list[Check]:
     return [replace(check, title=f"{check.title}, root mean square (6)") for check in found]
 
 
-def _stress(row: LoadRecord) -> float:
-    """Of the rods over their strength, on the mesh on which it is larger: q8 = q4 - 3/4 of the error of
-    q4.
-    """
-    error = row.rod_utilisation_error or 0.0
-    return max(row.rod_utilisation_max, row.rod_utilisation_max - 0.75 * error)
+def _strained(row: LoadRecord, rods: RodsOf) -> Cell:
+    """The rods' stress over their strength, with axial force, on the mesh on which it is larger: q8 = q4 -
+    3/4 of the error of q4, which is that of bending."""
+    finer = max(0.0, -0.75 * (row.rod_utilisation_error or 0.0))
+    share = row.stressed + finer
+    return share_of(share, rods.less_stressed(row.rod_utilisation_max + finer, share, 1.0))
 
 
 def _edged(row: LoadRecord) -> Cell:

@@ -96,6 +96,14 @@ def test_rods_that_would_bear_the_load_are_thicker_by_the_root_of_what_lacks(she
     assert "at least 1.3 mm radius (rod.radius = 0.0013)" in cell.remedy  # 1 mm / 0.8 = 1.25 mm
 
 
+def test_rods_break_by_what_axial_force_adds_to_their_bending_too(shell, designs):
+    cell = found(shell, designs, "none", rod_utilisation_max=0.86, stress_utilisation_max=1.02)
+    assert cell["Rods under no load"].found == "102 %"
+    assert cell["Rods under no load"].holds is False
+    both = {"rod_utilisation_max": 0.9, "rod_utilisation_error": -0.08, "stress_utilisation_max": 0.95}
+    assert found(shell, designs, "none", **both)["Rods under no load"].found == "101 %"
+
+
 def test_the_stress_is_the_larger_one_of_both_meshes(shell, designs):
     coarse = found(shell, designs, "none", rod_utilisation_max=0.96, rod_utilisation_error=0.04)
     fine = found(shell, designs, "none", rod_utilisation_max=0.96, rod_utilisation_error=-0.08)
