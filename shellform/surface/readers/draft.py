@@ -14,6 +14,7 @@ import numpy as np
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many, require_number
 from shellform.quantities import LENGTHS, if_other_unit
+from shellform.surface.shape.triangles import area_vectors
 
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000  # of one surface: they take 4 GB (allowance.py)
@@ -222,8 +223,7 @@ def triangulated(points: Reals, faces: Indices) -> Indices:
 
 def _fold(points: Reals, pairs: Indices) -> Reals:
     """Cosine (f,) of the angle between the normals of two triangles each (f, 2, 3)."""
-    corner = points[pairs]
-    normal = np.cross(corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0])
+    normal = area_vectors(points, pairs)
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-300)
     return np.asarray(np.sum(normal[:, 0] * normal[:, 1], axis=1))
 

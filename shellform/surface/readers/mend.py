@@ -22,9 +22,10 @@ from shellform.surface.readers.draft import Draft, choosable
 from shellform.surface.readers.seams import sewn, without_slivers
 from shellform.surface.readers.sides import shared_edges, side_of
 from shellform.surface.readers.teeth import without_teeth
+from shellform.surface.shape.triangles import counted_edges, directed_edges, triangle_areas, used_points
 
 _SAME = 1e-8  # of the size: vertices nearer than that are one
-_FLAT = 1e-9  # of the squared size: a surface smaller than that has no area
+_FLAT = 5e-10  # of the squared size: a surface smaller than that has no area
 _FURTHEST = 1e9  # m from the origin
 _PIECES_TOLD = 5  # the largest ones, in one message
 _PARTED = 1e-6  # of the size: how far the two sides of a parted vertex move into their faces
@@ -46,9 +47,7 @@ def mended(draft: Draft, where: str, *, face: str | None = None, piece: int | No
     if not size > 0.0:
         raise InputError("has no extent", where=where, remedy="Export the surface as a mesh.")
     draft = _merged(draft, size)
-    corner = draft.points[draft.triangles]
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum()
-    if not area > _FLAT * size * size:
+    if not triangle_areas(draft.points, draft.triangles).sum() > _FLAT * size * size:
         raise InputError(
             "the mesh has no triangle with an area", where=where, remedy="Export the surface as a mesh."
         )
@@ -162,8 +161,7 @@ def _without_points(draft: Draft) -> Draft:
 
 
 def _refuse_branches(draft: Draft, where: str) -> None:
-    edges = np.sort(np.vstack([draft.triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
-    pairs, counts = np.unique(edges, axis=0, return_counts=True)
+    pairs, counts = counted_edges(draft.triangles)
     if (counts > 2).any():
         place = draft.points[pairs[np.argmax(counts > 2), 0]]
         others = choosable(draft)
@@ -196,11 +194,7 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
         )
     if count == 1:
         return draft
-    corner = draft.points[draft.triangles]
-    area = np.bincount(
-        label,
-        0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1),
-    )
+    area = np.bincount(label, triangle_areas(draft.points, draft.triangles))
     order = np.argsort(-area, kind="stable")
     if piece is None:
         others = choosable(draft)
@@ -255,7 +249,7 @@ def _parted(draft: Draft, size: float) -> Draft:
     faces, count = draft.triangles, len(draft.triangles)
     at = faces.T.ravel()  # corner k of triangle t is row k * count + t
     row = np.arange(3 * count).reshape(3, count)
-    edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    edges = directed_edges(faces)
     ends = np.column_stack(
         [np.concatenate([row[0], row[1], row[2]]), np.concatenate([row[1], row[2], row[0]])]
     )
@@ -307,8 +301,6 @@ def noted(draft: Draft, note: str) -> Draft:
 
 def without_unused(draft: Draft) -> tuple[Draft, int]:
     """The draft without vertices that no triangle has, and their number."""
-    used = np.zeros(len(draft.points), dtype=bool)
-    used[draft.triangles.ravel()] = True
+    used, faces = used_points(draft.triangles, len(draft.points))
     normals = None if draft.normals is None else draft.normals[used]
-    faces = (np.cumsum(used) - 1)[draft.triangles]
     return replace(draft, points=draft.points[used], triangles=faces, normals=normals), int((~used).sum())

@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError
+from shellform.surface.shape.triangles import area_vectors, directed_edges
 
 _SHARP = np.cos(np.deg2rad(35.0))  # of the angle between normals: beyond, an edge sets two faces apart
 _ALSO = 0.25  # of the largest face's area in plan: others as large belong to that side too
@@ -24,9 +25,8 @@ def side_of(points: Reals, triangles: Indices, face: str, where: str) -> Flags:
 
     Raises InputError where no sharp edge sets it off from the rest.
     """
-    corner = points[triangles]
-    area = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    if np.sum(area * (corner[:, 0] - points.mean(axis=0))) < 0.0:
+    area = area_vectors(points, triangles)
+    if np.sum(area * (points[triangles[:, 0]] - points.mean(axis=0))) < 0.0:
         area = -area  # turned inwards
     size = np.linalg.norm(area, axis=1)
     unit = area / np.maximum(size, 1e-300)[:, None]
@@ -54,7 +54,7 @@ def shared_edges(triangles: Indices) -> tuple[Indices, Indices, Flags]:
     """The triangles on the two sides of each edge that two share, (e,) and (e,), and whether both pass it in
     the same direction (e,).
     """
-    edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    edges = directed_edges(triangles)
     owner = np.tile(np.arange(len(triangles)), 3)
     low, high = edges.min(axis=1), edges.max(axis=1)
     order = np.lexsort((high, low))

@@ -31,6 +31,7 @@ from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.sides import shared_edges
 from shellform.surface.shape.target import across_edges, closed_loops, rough_normals
 from shellform.surface.shape.tree import Tree
+from shellform.surface.shape.triangles import area_vectors, used_points
 
 _FEWEST = 24  # vertices of an edge with teeth
 _TEETH = 8  # of an edge, at the least
@@ -112,15 +113,14 @@ def _told(draft: Draft, placed: Reals, faces: Indices, track: Tree, edges: int) 
     """The draft of these points (v, 3) and triangles, with a note of how far from the curves the edge was at
     most where it is smooth now."""
     moved = (placed != draft.points).any(axis=1)
-    used = np.zeros(len(moved), dtype=bool)
-    used[faces] = True
+    used, among_used = used_points(faces, len(moved))
     most = float(track.nearest(draft.points[moved | ~used])[2].max())
     told = how_many(edges, "edge was toothed and was smoothed", "edges were toothed and were smoothed")
     given = None if draft.normals is None else np.where(moved[:, None], 0.0, draft.normals)[used]
     return replace(
         draft,
         points=placed[used],
-        triangles=(np.cumsum(used) - 1)[faces],
+        triangles=among_used,
         normals=given,
         notes=(*draft.notes, f"{told}, by {number(most, 2)} m at most"),
     )
@@ -285,10 +285,10 @@ def _on_rim(faces: Indices, count: int) -> Indices:
 
 def _poor(before: Reals, after: Reals, faces: Indices, thin: float) -> tuple[Flags, Flags]:
     """Which triangles (t,) turn over, and which become lower than `thin`, m."""
-    old, new = (np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]) for at in (before[faces], after[faces]))
+    old, new = area_vectors(before, faces), area_vectors(after, faces)
     corner = after[faces]
     longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
-    return np.sum(old * new, axis=1) <= 0.0, np.linalg.norm(new, axis=1) < thin * longest
+    return np.sum(old * new, axis=1) <= 0.0, 2.0 * np.linalg.norm(new, axis=1) < thin * longest
 
 
 def _whole(faces: Indices) -> Indices | None:
