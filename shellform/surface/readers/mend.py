@@ -20,7 +20,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Draft, choosable
 from shellform.surface.readers.seams import sewn, without_slivers
-from shellform.surface.readers.sides import shared_edges, side_of
+from shellform.surface.readers.sides import pieces_of, shared_edges, side_of
 from shellform.surface.readers.teeth import without_teeth
 from shellform.surface.shape.triangles import counted_edges, directed_edges, triangle_areas, used_points
 
@@ -88,7 +88,8 @@ def turned_alike(triangles: Indices, where: str) -> Indices:
         raise InputError(
             "the surface has one side only, like a Möbius strip", where=where, remedy="Check the faces."
         )
-    pieces, piece = _pieces(triangles)
+    piece = pieces_of(triangles)
+    pieces = int(piece.max()) + 1
     start = np.zeros(pieces, dtype=np.int64)
     start[piece[::-1]] = np.arange(count)[::-1]
     turned = label[:count] != label[start[piece]]
@@ -175,16 +176,9 @@ def _refuse_branches(draft: Draft, where: str) -> None:
         )
 
 
-def _pieces(triangles: Indices) -> tuple[int, Indices]:
-    """The number of pieces that hang together by edges, and the piece of each triangle (t,)."""
-    first, second, _ = shared_edges(triangles)
-    links = sp.csr_array((np.ones(len(first)), (first, second)), shape=(len(triangles), len(triangles)))
-    count, label = connected_components(links, directed=False)
-    return int(count), label.astype(np.int64)
-
-
 def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
-    count, label = _pieces(draft.triangles)
+    label = pieces_of(draft.triangles)
+    count = int(label.max()) + 1
     if piece is not None and not 1 <= piece <= count:
         raise InputError(
             f"{where} has no such piece",

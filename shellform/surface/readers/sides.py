@@ -32,9 +32,7 @@ def side_of(points: Reals, triangles: Indices, face: str, where: str) -> Flags:
     unit = area / np.maximum(size, 1e-300)[:, None]
     first, second, _ = shared_edges(triangles)
     smooth = np.sum(unit[first] * unit[second], axis=1) > _SHARP
-    count = len(triangles)
-    links = sp.csr_array((np.ones(int(smooth.sum())), (first[smooth], second[smooth])), shape=(count, count))
-    _, label = connected_components(links, directed=False)
+    label = _linked(first[smooth], second[smooth], len(triangles))
     up = 1.0 if face == "upper" else -1.0
     plan = np.bincount(label, weights=up * area[:, 2])
     best = float(plan.max())
@@ -61,3 +59,15 @@ def shared_edges(triangles: Indices) -> tuple[Indices, Indices, Flags]:
     same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
     first, second = order[:-1][same], order[1:][same]
     return owner[first], owner[second], np.asarray(edges[first, 0] == edges[second, 0])
+
+
+def pieces_of(triangles: Indices) -> Indices:
+    """The piece of each triangle (t,), numbered from 0: what hangs together by edges."""
+    first, second, _ = shared_edges(triangles)
+    return _linked(first, second, len(triangles))
+
+
+def _linked(first: Indices, second: Indices, count: int) -> Indices:
+    """Of `count` triangles the group of each (t,), the `first` (e,) being in one with the `second` (e,)."""
+    links = sp.csr_array((np.ones(len(first)), (first, second)), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)

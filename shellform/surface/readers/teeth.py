@@ -20,7 +20,6 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu, spsolve
 from scipy.spatial import cKDTree
 
@@ -28,7 +27,7 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import how_many
 from shellform.quantities import number
 from shellform.surface.readers.draft import Draft
-from shellform.surface.readers.sides import shared_edges
+from shellform.surface.readers.sides import pieces_of
 from shellform.surface.shape.target import across_edges, closed_loops, rough_normals
 from shellform.surface.shape.tree import Tree
 from shellform.surface.shape.triangles import area_vectors, used_points
@@ -293,9 +292,7 @@ def _poor(before: Reals, after: Reals, faces: Indices, thin: float) -> tuple[Fla
 
 def _whole(faces: Indices) -> Indices | None:
     """The triangles of the largest piece that hangs together by sides; None where another is no crumb."""
-    first, second, _ = shared_edges(faces)
-    links = sp.csr_array((np.ones(len(first)), (first, second)), shape=(len(faces), len(faces)))
-    label = connected_components(links, directed=False)[1]
+    label = pieces_of(faces)
     sizes = np.bincount(label, minlength=1)
     others = np.delete(sizes, np.argmax(sizes))
     return None if others.max(initial=0) > _BROKEN_OFF * len(faces) else faces[label == np.argmax(sizes)]
