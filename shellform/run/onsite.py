@@ -283,11 +283,8 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
     shell, load = run.shell_of(name), run.loads[options.load]
     design, state = run.designs[name], run.states[name][options.load]
     if options.after is None:
-        return (
-            name,
-            shell,
-            retensioning.first_belief(shell, design, state, load, length_error=options.length_error),
-        )
+        believed = retensioning.first_belief(design, state, load, length_error=options.length_error)
+        return name, shell, believed
     remedy = "Name the schedules/belief-1.npz of the round before, or its number's."
     require_file(options.after)
     try:

@@ -119,9 +119,7 @@ class Replay(Record):
         return float(1.0 - self.misfits[-1] / self.misfits[0])
 
 
-def first_belief(
-    shell: Gridshell, design: Design, state: State, load: Reals, *, length_error: float
-) -> Belief:
+def first_belief(design: Design, state: State, load: Reals, *, length_error: float) -> Belief:
     """What is believed before the first survey: lengths as drawn with the usual error `length_error`, m (one
     standard deviation), of a cable; `state` is the design's equilibrium under the `load`."""
     PLACE_DEVIATION.require(length_error, where="--length-error")

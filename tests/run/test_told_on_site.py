@@ -248,7 +248,7 @@ def test_the_round_after_goes_on_from_what_was_believed_of_the_same_design_and_l
     monkeypatch.setattr(
         onsite.retensioning,
         "first_belief",
-        lambda shell, own, state, load, *, length_error: (own, load, length_error),
+        lambda own, state, load, *, length_error: (own, load, length_error),
     )
     assert onsite._believed(run, Survey(load="wet", length_error=0.003))[2] == (drawn, "concrete", 0.003)
 

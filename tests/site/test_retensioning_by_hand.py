@@ -55,13 +55,13 @@ def belief(deviation=(0.01, 0.02, 0.03)):
 
 
 def test_cables_are_believed_to_be_as_long_as_drawn_with_their_usual_error():
-    found = first_belief(SHELL, DESIGN, STATE, LOAD, length_error=0.002)
+    found = first_belief(DESIGN, STATE, LOAD, length_error=0.002)
     np.testing.assert_allclose(found.covariance, 4e-6 * np.eye(3))
     for error in (0.9e-9, 1.1):
         with pytest.raises(InputError, match=r"--length-error.*such as 0\.0001"):
-            first_belief(SHELL, DESIGN, STATE, LOAD, length_error=error)
+            first_belief(DESIGN, STATE, LOAD, length_error=error)
     for error in (1.5e-9, 1.0):
-        assert first_belief(SHELL, DESIGN, STATE, LOAD, length_error=error).covariance[0, 0] == error**2
+        assert first_belief(DESIGN, STATE, LOAD, length_error=error).covariance[0, 0] == error**2
 
 
 def test_a_survey_teaches_what_the_formula_of_the_filter_says(linear):
