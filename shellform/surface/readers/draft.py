@@ -7,14 +7,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many, require_number
 from shellform.quantities import LENGTHS, if_other_unit
-from shellform.surface.shape.triangles import area_vectors
+from shellform.surface.shape.triangles import area_vectors, used_points
 
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000  # of one surface: they take 4 GB (allowance.py)
@@ -39,6 +39,13 @@ class Draft(Record):
     up: str = "z"
     notes: tuple[str, ...] = ()
     objects: tuple[str, ...] = ()
+
+
+def without_unused(draft: Draft) -> Draft:
+    """The draft without points that no triangle has."""
+    used, faces = used_points(draft.triangles, len(draft.points))
+    normals = None if draft.normals is None else draft.normals[used]
+    return replace(draft, points=draft.points[used], triangles=faces, normals=normals)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,11 +18,11 @@ from scipy.spatial import cKDTree
 from shellform import quantities
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many
-from shellform.surface.readers.draft import Draft, choosable
+from shellform.surface.readers.draft import Draft, choosable, without_unused
 from shellform.surface.readers.seams import sewn, without_slivers
 from shellform.surface.readers.sides import pieces_of, shared_edges, side_of
 from shellform.surface.readers.teeth import without_teeth
-from shellform.surface.shape.triangles import counted_edges, directed_edges, triangle_areas, used_points
+from shellform.surface.shape.triangles import counted_edges, directed_edges, triangle_areas
 
 _SAME = 1e-8  # of the size: vertices nearer than that are one
 _FLAT = 5e-10  # of the squared size: a surface smaller than that has no area
@@ -104,10 +104,12 @@ def _merged(draft: Draft, size: float) -> Draft:
     """Vertices at one place merged, whatever their last digits; no triangle without area or given twice; no
     vertex without triangle.
     """
-    unused = without_unused(draft)[1]
+    kept = without_unused(draft)
+    unused = len(draft.points) - len(kept.points)
     if unused:
-        points = how_many(unused, "point of no face was dropped", "points of no face were dropped")
-        draft = noted(without_unused(draft)[0], points)
+        draft = noted(
+            kept, how_many(unused, "point of no face was dropped", "points of no face were dropped")
+        )
     draft = _without_points(draft)
     same = _same_places(draft.points, _SAME * size)
     merged = int((same != np.arange(len(same))).sum())
@@ -125,7 +127,7 @@ def _merged(draft: Draft, size: float) -> Draft:
             len(draft.triangles) - len(once), "face given twice was dropped", "faces given twice were dropped"
         )
         draft = noted(replace(draft, triangles=draft.triangles[np.sort(once)]), note)
-    return without_unused(draft)[0]
+    return without_unused(draft)
 
 
 def _same_places(points: Reals, reach: float) -> Indices:
@@ -158,7 +160,7 @@ def _without_points(draft: Draft) -> Draft:
             replace(draft, triangles=draft.triangles[whole]),
             how_many(int((~whole).sum()), "face without area was dropped", "faces without area were dropped"),
         )
-    return without_unused(draft)[0]
+    return without_unused(draft)
 
 
 def _refuse_branches(draft: Draft, where: str) -> None:
@@ -204,7 +206,7 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
         )
     kept = replace(draft, triangles=draft.triangles[label == order[piece - 1]])
     return noted(
-        without_unused(kept)[0],
+        without_unused(kept),
         f"piece {piece} of {count} was taken, {quantities.number(area[order[piece - 1]])} m²",
     )
 
@@ -231,9 +233,7 @@ def _open(draft: Draft, face: str | None, where: str) -> Draft:
             remedy="Choose its upper or lower face (surface.face, --face), or export that face alone.",
         )
     kept = replace(draft, triangles=draft.triangles[side_of(draft.points, draft.triangles, face, where)])
-    return _one_piece(
-        noted(without_unused(kept)[0], f"the {face} face of a closed skin was taken"), None, where
-    )
+    return _one_piece(noted(without_unused(kept), f"the {face} face of a closed skin was taken"), None, where)
 
 
 def _parted(draft: Draft, size: float) -> Draft:
@@ -291,10 +291,3 @@ def _parted(draft: Draft, size: float) -> Draft:
 def noted(draft: Draft, note: str) -> Draft:
     """The draft with one more note."""
     return replace(draft, notes=(*draft.notes, note))
-
-
-def without_unused(draft: Draft) -> tuple[Draft, int]:
-    """The draft without vertices that no triangle has, and their number."""
-    used, faces = used_points(draft.triangles, len(draft.points))
-    normals = None if draft.normals is None else draft.normals[used]
-    return replace(draft, points=draft.points[used], triangles=faces, normals=normals), int((~used).sum())

@@ -20,13 +20,12 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Indices, Reals
 from shellform.errors import how_many
 from shellform.quantities import number
-from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.draft import Draft, without_unused
 from shellform.surface.shape.triangles import (
     area_vectors,
     directed_edges,
     open_edges,
     triangle_areas,
-    used_points,
 )
 
 _GAP = 0.1  # of the mean length of open edges
@@ -102,7 +101,7 @@ def _vertices_joined(draft: Draft, reach: float) -> tuple[Draft, int, float]:
             joined, moved = joined + 1, max(moved, float(gap[k]))
     faces = same[draft.triangles]
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return _compact(draft, points, faces[whole]), joined, moved
+    return without_unused(replace(draft, points=points, triangles=faces[whole])), joined, moved
 
 
 def _edges_cut(draft: Draft, reach: float) -> tuple[Draft, int, float]:
@@ -194,7 +193,7 @@ def _fewer_slivers(draft: Draft) -> tuple[Draft, tuple[int, int, int]]:
         faces[rows[: len(new)]] = new
         done[kind] += 1
         touched[np.unique(draft.triangles[ring])] = True
-    return _compact(draft, points, faces[alive]), (done[0], done[1], done[2])
+    return without_unused(replace(draft, triangles=faces[alive])), (done[0], done[1], done[2])
 
 
 def _incidence(faces: Indices, count: int) -> tuple[Indices, Indices]:
@@ -256,9 +255,3 @@ def _heights(points: Reals, faces: Indices) -> Reals:
     corner = points[faces]
     longest = np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2).max(axis=1)
     return np.asarray(2.0 * triangle_areas(points, faces) / np.maximum(longest, 1e-300) ** 2)
-
-
-def _compact(draft: Draft, points: Reals, faces: Indices) -> Draft:
-    used, faces = used_points(faces, len(points))
-    normals = None if draft.normals is None else draft.normals[used]
-    return replace(draft, points=points[used], triangles=faces, normals=normals)
