@@ -22,6 +22,7 @@ from shellform.net.net import Net
 from shellform.output.pictures.panel import marked_nodes, scale_end
 from shellform.problem.paths import deviations
 from shellform.records import words
+from shellform.site.erection_steps import turn_in_plan
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
 
@@ -218,11 +219,11 @@ def _before(net: Net, place: Reals) -> Reals:
 
 
 def laid_out(flat: Reals, place: Reals) -> Reals:
-    """The flat grid (n, 3), m, turned and moved in plan to where it lies nearest to `place` (n, 3) (Kabsch
-    1976, in two dimensions), on the level of its lowest point."""
+    """The flat grid (n, 3), m, turned and moved in plan to where it lies nearest to `place` (n, 3), on the
+    level of its lowest point."""
     first, second = (each[:, :2] - each[:, :2].mean(axis=0) for each in (flat, place))
-    left, _, right = np.linalg.svd(first.T @ second)
-    turn = left @ np.diag([1.0, np.linalg.det(left @ right)]) @ right
+    angle = turn_in_plan(first, second)
+    turn = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
     level = place[:, 2].min() + flat[:, 2] - flat[:, 2].min()
     return np.column_stack([first @ turn + place[:, :2].mean(axis=0), level])
 
