@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -186,10 +186,10 @@ def _lock(held: int, place: Path, wait: bool) -> None:
         raise refusal(place / LOCK, error) from error
 
 
-def refuse_links(place: Path) -> None:
-    """Raises InputError where something in a run folder is a symbolic link, which could lead a reader or
-    writer anywhere."""
-    for name in WRITTEN:
+def refuse_links(place: Path, names: Sequence[str] = WRITTEN) -> None:
+    """Raises InputError where one of these `names` in a folder, left out those that a run writes, is a
+    symbolic link, which could lead a reader or writer anywhere."""
+    for name in names:
         if (place / name).is_symlink():
             raise InputError(
                 "is a symbolic link, which isn't followed",
