@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
 from shellform.quantities import number
 from shellform.records.as_built import critical_checks, guide_checks, standing_checks
-from shellform.records.check import SLACK, UNASKED, Cell, Check, Subject, below, share_of
+from shellform.records.check import SLACK, UNASKED, Cell, Check, Subject, below, on_worse_mesh, share_of
 from shellform.records.limited import Bounds, limited
 from shellform.records.optimisation import OptimisationRecord
 from shellform.records.remedies import RodsOf, allow, allow_count
@@ -134,11 +134,8 @@ def _deviating(judged: _Judged, bounds: Bounds) -> list[Check]:
 
 
 def _stress(row: LoadRecord) -> float:
-    """Of the rods over their strength, on the mesh on which it is larger: q8 = q4 - 3/4 of the error of
-    q4.
-    """
-    error = row.rod_utilisation_error or 0.0
-    return max(row.rod_utilisation_max, row.rod_utilisation_max - 0.75 * error)
+    """Of the rods over their strength."""
+    return on_worse_mesh(row.rod_utilisation_max, row.rod_utilisation_error)
 
 
 def _edged(row: LoadRecord) -> Cell:
