@@ -105,6 +105,16 @@ def called(layer: str, name: str) -> str:
     return " on ".join([*([repr(name)] if name else []), *([f"layer {layer!r}"] if layer else [])])
 
 
+def told_apart(names: Sequence[str], kind: str) -> list[str]:
+    """The names of a file's objects, of which none is empty then and none there twice: with its number, from
+    1, after one that was, or after the `kind`."""
+    times = Counter(names)
+    return [
+        name if name and times[name] < 2 else f"{name or kind} {number}"
+        for number, name in enumerate(names, 1)
+    ]
+
+
 def choosable(draft: Draft) -> str:
     """How one of the file's objects is chosen, and what they are called; "" where there is one, or where
     names and layers don't tell them apart."""
