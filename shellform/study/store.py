@@ -27,6 +27,7 @@ from typing import Any, BinaryIO
 from pydantic import TypeAdapter, ValidationError
 
 from shellform.errors import InputError, not_installed
+from shellform.records.checks import BUILT
 from shellform.records.files import plain
 from shellform.study.outcome import TRIED_AGAIN, ListedDesign, Outcome, Value
 from shellform.tables import Table, table_text
@@ -35,7 +36,7 @@ from shellform.written import whole, write_text
 _OUTCOME = TypeAdapter(Outcome)
 _GROUP = 4096  # rows of a row group, and all that are in memory at once
 _KINDS = {"bool": 0, "int": 1, "float": 2, "str": 3}
-_BUILT = ("polished", "rounded", "optimised", "initial")
+_BUILT = (*reversed(BUILT), "initial")
 
 
 class Log:
