@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Reals, Record, reals
 from shellform.errors import InputError
 from shellform.net.compass import Finder, Guide, raised
-from shellform.surface.shape.target import Surface, triangle_areas
+from shellform.surface.shape.target import Surface
+from shellform.surface.shape.triangles import triangle_areas
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,9 @@ from shellform.net.grid import Grid, cells, crossing_points, neighbours
 from shellform.net.refusal import NoNet, Reason
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
-from shellform.surface.shape.target import Surface, triangle_areas
+from shellform.surface.shape.target import Surface
 from shellform.surface.shape.tree import Tree
+from shellform.surface.shape.triangles import triangle_areas
 
 _FAR = 0.1  # of the spacing: a net farther from the surface is refused
 SPACING_ERROR = 0.005  # of the spacing: more is told, and not proposed; rods bend to 2.9 spacings there

@@ -22,7 +22,7 @@ from shellform.net.grid import Grid, GridRod
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.polylines import closed, inside, nearest
 from shellform.net.refusal import NoNet, Reason
-from shellform.structure.elements.rotation import matrices
+from shellform.structure.elements.rotation import between, matrices
 from shellform.structure.elements.state import State
 from shellform.structure.network import connected
 
@@ -306,7 +306,7 @@ def _rebuild(grid: Grid, state: State, kept: list[tuple[_Piece, list[int]]], not
         a, b, share = _locate(rod, arcs)
         flat.append(_between(grid.flat, a, b, share))
         positions.append(_curved(state, a, b, share, np.full(len(a), layer)))
-        turns.append(_turned(state, a, b, share))
+        turns.append(between(state.quaternions[a], state.quaternions[b], share[:, None]))
         origin += [-1, *(int(n) for n in rod.nodes[places]), -1]
         numbers = first + np.arange(len(arcs))
         supports += [first, first + len(arcs) - 1]
@@ -350,11 +350,3 @@ def _curved(state: State, a: Indices, b: Indices, share: Reals, axis: Indices) -
         (1 + 2 * t) * (1 - t) ** 2 * p + t * t * (3 - 2 * t) * q + t * (1 - t) ** 2 * m + t * t * (t - 1) * n
     )
     return np.asarray(np.where(t == 0.0, p, np.where(t == 1.0, q, cubic)))
-
-
-def _turned(state: State, a: Indices, b: Indices, share: Reals) -> Reals:
-    """Quaternions (k, 4) between those of the elements' ends."""
-    first, second = state.quaternions[a], state.quaternions[b]
-    near = np.where(np.sum(first * second, axis=1, keepdims=True) >= 0.0, second, -second)
-    mixed = (1.0 - share[:, None]) * first + share[:, None] * near
-    return np.asarray(mixed / np.linalg.norm(mixed, axis=1, keepdims=True))

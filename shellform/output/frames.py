@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import rod_names
 from shellform.optimiser.optimum import Optimum
+from shellform.output.pictures.maps import worst_at_nodes
 from shellform.output.workshop.schedules import cable_crossings
 from shellform.problem.paths import deviations
 from shellform.structure.elements.state import State
@@ -64,10 +63,10 @@ def rods(shell: Gridshell, design: Design, states: Mapping[str, State]) -> Table
     strength bending takes."""
     grid = shell.net.grid
     off = {name: deviations(shell, state) for name, state in states.items()}
-    used = {}
-    for name, state in states.items():
-        used[name] = np.zeros(shell.node_count)
-        np.maximum.at(used[name], grid.rod_ends, shell.bending_utilisation(design, state))
+    used = {
+        name: worst_at_nodes(shell.net, shell.bending_utilisation(design, state))
+        for name, state in states.items()
+    }
     heads = ["rod", "length [m]", "crossings"]
     for name in states:
         heads += [f"{name}: off the target [m]", f"{name}: stress over strength"]

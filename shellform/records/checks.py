@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
 from shellform.quantities import number
 from shellform.records.as_built import critical_checks, guide_checks, standing_checks
-from shellform.records.check import SLACK, UNASKED, Cell, Check, Subject, below, share_of
+from shellform.records.check import SLACK, UNASKED, Cell, Check, Subject, below, on_worse_mesh, share_of
 from shellform.records.limited import Bounds, limited
 from shellform.records.optimisation import OptimisationRecord
 from shellform.records.remedies import RodsOf, allow, allow_count
@@ -134,11 +134,11 @@ def _deviating(judged: _Judged, bounds: Bounds) -> list[Check]:
 
 
 def _strained(row: LoadRecord, rods: RodsOf) -> Cell:
-    """The rods' stress over their strength, with axial force, on the mesh on which it is larger: q8 = q4 -
-    3/4 of the error of q4, which is that of bending."""
-    finer = max(0.0, -0.75 * (row.rod_utilisation_error or 0.0))
-    share = row.stressed + finer
-    return share_of(share, rods.less_stressed(row.rod_utilisation_max + finer, share, 1.0))
+    """The rods' stress over their strength, with axial force; that on another mesh differs by as much as that
+    of bending."""
+    bending, error = row.rod_utilisation_max, row.rod_utilisation_error
+    share = on_worse_mesh(row.stressed, error)
+    return share_of(share, rods.less_stressed(on_worse_mesh(bending, error), share, 1.0))
 
 
 def _edged(row: LoadRecord) -> Cell:

@@ -55,13 +55,9 @@ def read_history(folder: Path) -> tuple[Step, ...]:
         raise Damaged(f"is damaged: {error}", where=str(path), remedy=ANEW) from error
 
 
-def _step(number: int, row: Mapping[str | None, str | None]) -> Step:
-    if None in row or None in row.values():
+def _step(number: int, row: Mapping[str, str]) -> Step:
+    if None in row or None in row.values():  # as DictReader leaves cells too many, and too few
         raise ValueError(f"row {number} has another length than the heads")
-    return _numbers({str(name): str(value) for name, value in row.items()})
-
-
-def _numbers(row: Mapping[str, str]) -> Step:
     return Step(
         evaluation=int(row["evaluation"]),
         objective=float(row["objective"]),

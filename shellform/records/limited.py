@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from shellform.quantities import newtons
 from shellform.records.as_built import AsBuilt
-from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, quantity
+from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, on_worse_mesh, quantity
 from shellform.records.remedies import RodSizes, RodsOf, allow, allow_less, rounded_up
 from shellform.records.summary import DesignRecord, LoadRecord
 from shellform.records.words import load_title
@@ -198,8 +198,8 @@ def _pull(row: DesignRecord) -> _Found | None:
 
 
 def _deviation(row: LoadRecord) -> float:
-    """The largest, m, on the mesh on which it is larger: q8 = q4 - 3/4 of the error of q4."""
-    return max(row.deviation_max, row.deviation_max - 0.75 * (row.deviation_max_error or 0.0))
+    """The largest, m."""
+    return on_worse_mesh(row.deviation_max, row.deviation_max_error)
 
 
 def _built_deviation(row: LoadRecord) -> float | None:

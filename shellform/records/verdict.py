@@ -6,36 +6,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shellform.errors import how_many
-from shellform.records.check import Cell, Check
+from shellform.records.check import UNASKED, Cell, Check
 from shellform.records.checks import BUILT
 from shellform.records.summary import VerdictRecord
 
 
 def failed(found: Sequence[Check], design: str) -> list[Check]:
     """The checks that don't hold for the design."""
-    return [
-        check
-        for check in found
-        if design in check.cells and check.cells[design].asked and check.cells[design].holds is False
-    ]
+    return _that(found, design, holds=False)
 
 
 def open_checks(found: Sequence[Check], design: str) -> list[Check]:
     """The checks that were asked for and not, or not enough, examined."""
-    return [
-        check
-        for check in found
-        if design in check.cells and check.cells[design].asked and check.cells[design].holds is None
-    ]
+    return _that(found, design, holds=None)
 
 
 def asked(found: Sequence[Check], design: str) -> int:
     """How many checks were made of the design."""
-    return sum(
-        check.cells[design].asked and check.cells[design].holds is not None
-        for check in found
-        if design in check.cells
-    )
+    return len(_that(found, design, holds=True)) + len(failed(found, design))
+
+
+def _that(found: Sequence[Check], design: str, *, holds: bool | None) -> list[Check]:
+    """The checks asked for of which the design `holds` so much (None: that isn't known)."""
+    cells = ((check, check.cells.get(design, UNASKED)) for check in found)
+    return [check for check, cell in cells if cell.asked and cell.holds is holds]
 
 
 def verdict(found: Sequence[Check], design: str) -> VerdictRecord:

@@ -17,11 +17,7 @@ import numpy as np
 from shellform.arrays import Reals, Record, reals
 from shellform.errors import NotConverged
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import (
-    built_cables,
-    errors_of,
-    variables,
-)
+from shellform.reliability.drawing import built_cables, draw_errors
 from shellform.reliability.expected_cables import ExpectedCables
 from shellform.reliability.first_order import moved_from
 from shellform.reliability.perfect import Perfect
@@ -81,10 +77,7 @@ def stretch_deviation(
     own = np.full(len(cables.ends), max(tolerances.cable_length, _LEAST))
     if not len(cables.ends):
         return own
-    some = [
-        errors_of(perfect.members, tolerances, variables(perfect.members, seed, number))
-        for number in range(drawn)
-    ]
+    some = [draw_errors(perfect.members, tolerances, seed, number) for number in range(drawn)]
     try:
         found = moved_from(assembly, state, none, perfect.present, some, None).translations
     except NotConverged:

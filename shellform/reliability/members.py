@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Indices, Reals, Record
 from shellform.gridshell.gridshell import Gridshell
 from shellform.gridshell.layers import LOCK
+from shellform.net.grid import ROD
 from shellform.structure.elements.beam import Beams
 from shellform.structure.model import Model
 
@@ -142,7 +143,7 @@ def members_of_model(model: Model) -> Members:
     """Those of a model file: its cables, its supports' translations, a zone for each node."""
     network = model.network
     beams, count = network.beams, len(network.nodes)
-    rod = np.array([kind == "rod" for kind in beams.kinds])[beams.kind]
+    rod = beams.of_kind(ROD)
     other = ~(rod | beams.of_kind(LOCK))
     touched = np.asarray(network.fixed.any(axis=1))
     for ends in (beams.ends[other], network.cables.ends):

@@ -146,7 +146,7 @@ class Loading(Branch):
             return DrawnOutcome(self.number, factor, False, np.inf, here.state, self.spent, snaps)
         far = np.inf
         if nominal.bears:
-            far = float(np.linalg.norm(here.state.positions - nominal.states[-1].positions, axis=1).max())
+            far = self._farthest(here.state, nominal.states[-1])
         stands = far <= FAR * nominal.members.span
         return DrawnOutcome(self.number, factor, stands, far, here.state, self.spent, snaps)
 

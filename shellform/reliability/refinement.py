@@ -17,8 +17,8 @@ from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import LOCK, locks_along, rod_bending_stress
 from shellform.gridshell.tolerances import Tolerances
+from shellform.net.grid import ROD
 from shellform.reliability.drawing import PERFECT, draw_errors
-from shellform.reliability.members import members_of_model
 from shellform.reliability.path_of_one import SOUGHT, Limit
 from shellform.reliability.perfect import perfect_of
 from shellform.reliability.standing import Workshop
@@ -86,13 +86,13 @@ def rods_halved(model: Model) -> Model:
     the start anew; its nodes come first, in their order."""
     network = model.network
     beams, count = network.beams, len(network.nodes)
-    rods = np.flatnonzero(np.array([kind == "rod" for kind in beams.kinds])[beams.kind])
+    rods = np.flatnonzero(beams.of_kind(ROD))
     a, b = beams.ends[rods].T
     new = count + np.arange(len(rods))
     nodes = np.vstack([network.nodes, 0.5 * (network.nodes[a] + network.nodes[b])])
     ends, again = beams.ends.copy(), beams.ends[rods].copy()
     ends[rods, 1], again[:, 0] = new, new
-    cut = _repeated(beams, rods)
+    cut = beams.chosen(np.append(np.arange(len(beams.ends)), rods))
     rest = cut.rest_length.copy()
     rest[rods] *= 0.5
     rest[len(beams.ends) :] *= 0.5
@@ -130,17 +130,11 @@ def _with_locks_cut(finer: Beams, start: State, beams: Beams, rods: Indices, mid
     return joined(finer.chosen(kept), locks_along(start, halves, y_axes, bending))
 
 
-def _repeated(beams: Beams, rods: np.ndarray) -> Beams:
-    """The beams, then those of the rods once more."""
-    return beams.chosen(np.concatenate([np.arange(len(beams.ends)), rods]))
-
-
 def _limit(model: Model, sought: float, resolution: float) -> tuple[Workshop, Limit]:
     """Where the perfect structure's path ends, and the workshop that has it."""
     nominal = perfect_of(model, _LOAD, shapes=0, step=_STEP)
     workshop = Workshop(nominal)
-    members = members_of_model(model)
-    none = draw_errors(members, Tolerances(), 0, PERFECT)
+    none = draw_errors(nominal.members, Tolerances(), 0, PERFECT)
     return workshop, workshop.limit(
         none, most=sought, step=_STEP, resolution=resolution, begin=nominal.known_to(sought)
     )

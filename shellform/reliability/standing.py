@@ -25,11 +25,7 @@ from shellform.arrays import Reals
 from shellform.errors import require_count
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import (
-    Errors,
-    errors_of,
-    variables,
-)
+from shellform.reliability.drawing import Errors, draw_errors
 from shellform.reliability.path_of_one import (
     BORNE,
     ENDED,
@@ -190,10 +186,9 @@ class Workshop:
         resting: float | None = None,
     ) -> list[DrawnOutcome]:
         """The structures of these numbers under the seed, each as `load` loads it."""
-        members = self.nominal.members
 
         def one(number: int) -> DrawnOutcome:
-            errors = errors_of(members, tolerances, variables(members, seed, number))
+            errors = draw_errors(self.nominal.members, tolerances, seed, number)
             return self.load(errors, number=number, step=step, marks=marks, resting=resting)
 
         return side_by_side(one, list(numbers))

@@ -328,12 +328,13 @@ def _failure(workspace: Workspace, each: Examined, count: int) -> FailureRecord 
     if not each.tolerances.causes:  # the perfect structure falls, of which its critical factor tells
         return None
     clock = Clock(0)
-    for load in sorted(each.loads, key=lambda name: float(np.linalg.norm(each.loads[name]))):
-        route = next((largest for largest, shares in paths(each.loads).items() if load in shares), None)
-        path = None if route is None else _drawn(workspace, each, route, count, clock)
-        if route is None or path is None:
+    lies = {load: (largest, own[load]) for largest, own in paths(each.loads).items() for load in own}
+    loaded = [load for load in each.loads if load in lies]
+    for load in sorted(loaded, key=lambda name: float(np.linalg.norm(each.loads[name]))):
+        route, share = lies[load]
+        path = _drawn(workspace, each, route, count, clock)
+        if path is None:
             continue
-        share = paths(each.loads)[route][load]
         fallen = sorted(
             (factor / share, number)
             for number, factor in enumerate(path.factors)

@@ -21,6 +21,7 @@ from shellform.run.figures import Wish, look_of, titled
 from shellform.run.folder import Run, figures_folder
 from shellform.site.erection import erect
 from shellform.site.erection_steps import ErectionStep
+from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import Equilibrium
@@ -113,12 +114,8 @@ def _between(found: Sequence[tuple[float, State]], share: float) -> State:
         return found[after][1]
     (low, a), (high, b) = found[after - 1], found[after]
     t = (share - low) / (high - low)
-    turned = (1.0 - t) * a.quaternions + t * b.quaternions * np.sign(
-        np.sum(a.quaternions * b.quaternions, axis=1, keepdims=True)
-    )
-    return State(
-        (1.0 - t) * a.positions + t * b.positions, turned / np.linalg.norm(turned, axis=1, keepdims=True)
-    )
+    place = (1.0 - t) * a.positions + t * b.positions
+    return State(place, rotation.between(a.quaternions, b.quaternions, t))
 
 
 def _erection(run: Run, name: str, wish: Wish, report: Report) -> list[Any]:

@@ -170,7 +170,7 @@ class _Search:
             design = self._on_net(spacing, thickness)
             if design is not None:
                 return design
-        return self._thinner(spacing, thickness)
+        return self._thinner(thickness)
 
     def _first_spacing(self) -> float:
         if self.wish.spacing is not None:
@@ -267,7 +267,7 @@ class _Search:
             at = after(placed.net, possible, tried, last=narrows)
         return None
 
-    def _thinner(self, spacing: float, thickness: float) -> FirstDesign:
+    def _thinner(self, thickness: float) -> FirstDesign:
         """The thickest concrete that stands where the design falls. Raises where less than a layer is left,
         or another was asked for."""
         assert self.best is not None

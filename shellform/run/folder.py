@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from shellform.gridshell.gridshell import Design, Gridshell, Rod
 from shellform.net.net import Net
 from shellform.net.saved import load_net
 from shellform.records import stages
+from shellform.records.checks import BUILT
 from shellform.records.summary import Summary, read_summary, summary_version
 from shellform.run.design_files import design_file, read_design, undamaged
 from shellform.structure.elements.state import State
@@ -31,7 +32,7 @@ from shellform.surface.shape.target import Surface
 from shellform.written import clear, make_folder, refusal, write_arrays
 
 LOCK = "lock"
-DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "rounded", "polished")
+DESIGNS = ("unbraced", "initial", "unloaded", *BUILT)
 WRITTEN = (
     "case.toml", "summary.json", "stages.json", "history.csv", "surface.npz", "net.npz", "net.json", "designs", "states", "figures",
     "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt", "profile.json", LOCK,
@@ -84,11 +85,7 @@ class Run(Record):
         judged = self.summary.verdict
         if judged is not None and judged.design in self.designs:
             return judged.design
-        return [
-            name
-            for name in ("unbraced", "initial", "optimised", "rounded", "polished")
-            if name in self.designs
-        ][-1]
+        return [name for name in DESIGNS if name in self.designs and name != "unloaded"][-1]
 
     def shell_of(self, name: str) -> Gridshell:
         """The shell with the rods of a design: those of a rounded one come from the catalogue."""
@@ -186,10 +183,10 @@ def _lock(held: int, place: Path, wait: bool) -> None:
         raise refusal(place / LOCK, error) from error
 
 
-def refuse_links(place: Path) -> None:
-    """Raises InputError where something in a run folder is a symbolic link, which could lead a reader or
-    writer anywhere."""
-    for name in WRITTEN:
+def refuse_links(place: Path, names: Sequence[str] = WRITTEN) -> None:
+    """Raises InputError where one of these `names` in a folder, left out those that a run writes, is a
+    symbolic link, which could lead a reader or writer anywhere."""
+    for name in names:
         if (place / name).is_symlink():
             raise InputError(
                 "is a symbolic link, which isn't followed",

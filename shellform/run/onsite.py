@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from shellform.arrays import Reals, read_arrays
+from shellform.arrays import Indices, Reals, read_arrays
 from shellform.errors import (
     Damaged,
     InputError,
@@ -69,9 +69,7 @@ def calibrate(
     shell = grid.shell
     pairs = [scan_under(each, grid, unit, None if placed else 0) for each in scans]
     pairs, counted = counted_alike(pairs, shell.target.positions, grid.origin)
-    nodes = (
-        shell.net.grid.crossing_nodes[:, 1] if markers is None else measurements.read_nodes(markers, shell)
-    )
+    nodes = _marked(markers, shell)
     found = calibration.calibrate(
         shell, grid.design, pairs, nodes, free=free or calibration.PARAMETERS, noise=noise, offsets=offsets
     )
@@ -145,7 +143,6 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
         origin=np.array(f"{name}/{options.load}"),
         round=np.array(round_),
     )
-    count = int(np.count_nonzero(step.turns))
     size = len(goal)
     lines = [
         *seen.counted,
@@ -153,10 +150,10 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
         *doubtful(seen, belief, learnt, noise=options.noise),
         f"{how_many(len(seen.nodes), 'node was', 'nodes were')} seen; the grid lies {_mm(step.misfit_before, size)} mm from where it "
         f"should be (root mean square)",
-        f"{how_many(count, 'cable', 'cables')} to turn, {how_many(int(np.abs(step.turns).sum()), 'turn', 'turns')} "
+        f"{how_many(step.cables, 'cable', 'cables')} to turn, {how_many(step.turns_in_all, 'turn', 'turns')} "
         f"of {1e3 * options.step:g} mm; "
         f"afterwards {_mm(step.misfit_after, size)} mm are predicted"
-        if count
+        if step.cables
         else "no turn is worth taking: what is left is below what the survey can see or the crew can do",
     ]
     if step.halved:
@@ -183,9 +180,7 @@ def replay(
     retensioning.check_slip(slip)
     run = read_run(folder)
     name, shell, belief = _believed(run, options)
-    nodes = (
-        shell.net.grid.crossing_nodes[:, 1] if markers is None else measurements.read_nodes(markers, shell)
-    )
+    nodes = _marked(markers, shell)
     errors = options.length_error * np.random.default_rng(seed).normal(size=len(shell.cable_ends))
     goal = run.states[name][options.load].positions
     played = retensioning.replay(
@@ -200,10 +195,7 @@ def replay(
         seed=seed + 1,
         slip=slip,
     )
-    turned = [
-        (0, 0),
-        *((int(np.count_nonzero(each.turns)), int(np.abs(each.turns).sum())) for each in played.adjustments),
-    ]
+    turned = [(0, 0), *((each.cables, each.turns_in_all) for each in played.adjustments)]
     text = table_text(
         Table(
             "replay",
@@ -291,11 +283,8 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
     shell, load = run.shell_of(name), run.loads[options.load]
     design, state = run.designs[name], run.states[name][options.load]
     if options.after is None:
-        return (
-            name,
-            shell,
-            retensioning.first_belief(shell, design, state, load, length_error=options.length_error),
-        )
+        believed = retensioning.first_belief(design, state, load, length_error=options.length_error)
+        return name, shell, believed
     remedy = "Name the schedules/belief-1.npz of the round before, or its number's."
     require_file(options.after)
     try:
@@ -336,6 +325,11 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
     known = replace(design, rest_length=data["rest_length"], radius=float(data["radius"]))
     there = State(data["positions"], data["quaternions"])
     return name, shell, retensioning.Belief(known, data["covariance"], there, load)
+
+
+def _marked(markers: Path | None, shell: Gridshell) -> Indices:
+    """The nodes (m,) that a file names, or of all crossings the upper rod's."""
+    return shell.net.grid.crossing_nodes[:, 1] if markers is None else measurements.read_nodes(markers, shell)
 
 
 def _refuse_overwriting(files: Sequence[Path], read: Sequence[Path | None]) -> None:

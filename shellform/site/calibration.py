@@ -165,6 +165,7 @@ def calibrate(
         raise InputError("needs at least one scan", where="calibrate", remedy=remedy)
     beside = 0.5 * shell.net.spacing if reach is None else reach
     first = tuple(name for name in PARAMETERS if name in free)
+    task = _Task(markers, first, noise, offsets, beside)
     model = _Model(shell, design, [scan.load for scan in scans])
     joint, begun = shell.joint, model.begin(shell.joint)
     before = np.full((len(markers), len(scans)), np.nan)
@@ -176,9 +177,7 @@ def calibrate(
         # The start is too soft for some load states: what the others tell comes first.
         if carried:
             part = _Model(shell, design, [scans[k].load for k in carried])
-            joint = _rounds(
-                part, joint, near, [scans[k] for k in carried], markers, first, noise, offsets, beside
-            )[0]
+            joint = _rounds(part, joint, near, [scans[k] for k in carried], task)[0]
             model.evaluations += part.evaluations
             model.rejected += part.rejected
             begun = model.begin(joint)
@@ -186,9 +185,7 @@ def calibrate(
         if len(more) <= len(carried):
             _refuse(begun)
         carried, near = more, [begun[k].equilibrium.state for k in more]
-    joint, states, matches, fitted = _rounds(
-        model, joint, near, scans, markers, first, noise, offsets, beside
-    )
+    joint, states, matches, fitted = _rounds(model, joint, near, scans, task)
     fit = _Fit(model, joint, states, scans, matches, markers, offsets)
     deviation = fit.deviation(len(fitted))
     known = fit.identifiability(first, max(noise, deviation))
@@ -209,22 +206,26 @@ def calibrate(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Task(Record):
+    """What is the same in all fits: the nodes that are `markers` (m,), which parameters are `free`, the
+    `noise` and the `reach`, m, and whether markers may sit away from their nodes (`offsets`)."""
+
+    markers: Indices
+    free: tuple[str, ...]
+    noise: float
+    offsets: bool
+    reach: float
+
+
 def _rounds(
-    model: _Model,
-    joint: Joint,
-    states: list[State],
-    scans: Sequence[Scan],
-    markers: Indices,
-    free: tuple[str, ...],
-    noise: float,
-    offsets: bool,
-    reach: float,
+    model: _Model, joint: Joint, states: list[State], scans: Sequence[Scan], task: _Task
 ) -> tuple[Joint, list[State], list[Match], tuple[str, ...]]:
     """Fits, lays and names the points anew until nothing changes; the names of what was fitted come last."""
-    matches = laid(scans, states, markers, reach)
+    matches = laid(scans, states, task.markers, task.reach)
     for _ in range(_ROUNDS):
-        fit = _Fit(model, joint, states, scans, matches, markers, offsets)
-        known = fit.identifiability(free, noise)
+        fit = _Fit(model, joint, states, scans, matches, task.markers, task.offsets)
+        known = fit.identifiability(task.free, task.noise)
         if not known.tellable:
             raise NotConverged(
                 f"The data tell none of the stiffnesses: {' '.join(known.sentences()).removesuffix('.')}",
@@ -232,10 +233,10 @@ def _rounds(
                 remedy="Choose load states that move the markers more (see `foresee`).",
             )
         joint, states = fit.solve(known.tellable)
-        before, matches = matches, laid(scans, states, markers, reach)
+        before, matches = matches, laid(scans, states, task.markers, task.reach)
         pairs = list(zip(before, matches, strict=True))
         moved = max(apart(a.motion, b.motion, model.shell.target.positions) for a, b in pairs)
-        if moved < 0.1 * noise and all(np.array_equal(a.point, b.point) for a, b in pairs):
+        if moved < 0.1 * task.noise and all(np.array_equal(a.point, b.point) for a, b in pairs):
             break
     return joint, states, matches, known.tellable
 

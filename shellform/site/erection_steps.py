@@ -129,16 +129,19 @@ def laid_out(shell: Gridshell, held: Indices | None = None) -> State:
     flat, supports = shell.net.grid.flat, shell.net.supports if held is None else held
     here, goal = flat[supports], shell.target.positions[supports]
     middle, there = here.mean(axis=0), goal.mean(axis=0)
-    plan, wanted = (here - middle)[:, :2], (goal - there)[:, :2]
-    # The turn in plan that minimises the sum of squares has the angle of sum of conj(plan) * wanted as
-    # complex numbers.
-    cosine = float((plan * wanted).sum())
-    sine = float((plan[:, 0] * wanted[:, 1] - plan[:, 1] * wanted[:, 0]).sum())
-    angle = np.arctan2(sine, cosine)
+    angle = turn_in_plan((here - middle)[:, :2], (goal - there)[:, :2])
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     quaternions = rotation.from_vectors(np.tile([0.0, 0.0, angle], (len(flat), 1)))
     return State((flat - middle) @ turn.T + there, quaternions)
+
+
+def turn_in_plan(plan: Reals, wanted: Reals) -> float:
+    """The angle, rad, anticlockwise, by which plan points (k, 2) about their middle come nearest to those
+    `wanted`, by the sum of squares: that of the sum of conj(plan) * wanted as complex numbers."""
+    cosine = float((plan * wanted).sum())
+    sine = float((plan[:, 0] * wanted[:, 1] - plan[:, 1] * wanted[:, 0]).sum())
+    return float(np.arctan2(sine, cosine))
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,6 @@ class MeasuredRow:
 
 _NAMED = re.compile(r"[A-Za-z]+(\d+)")  # as drawings and schedules name cables: C12
 _STRETCH = 1.01  # times a rod's length: its ends get no farther apart before it breaks
-_TABLE = "Give a table as CSV in UTF-8, with a head line."
 
 
 def check_noise(noise: float) -> None:
@@ -39,20 +38,18 @@ def check_noise(noise: float) -> None:
     PLACE_DEVIATION.require(noise, where="--noise")
 
 
-def text_of(path: str | Path, remedy: str) -> str:
-    """The text of a file in UTF-8, without a mark at its beginning. Raises InputError, with the `remedy`."""
-    require_file(Path(path))
+def numbered_cells(
+    file: Path, remedy: str = "Give a table as CSV in UTF-8, with a head line."
+) -> list[tuple[int, list[str]]]:
+    """The lines of a table in UTF-8, each with its number and its cells; remarks and empty lines are passed
+    over. Cells are parted by what the first line has of semicolon, tab and comma, where it has none of them
+    by blanks. Raises InputError where the file can't be read, with the `remedy`, and where a line is no row
+    of its own: a quotation mark that isn't closed runs on over the lines that follow."""
+    require_file(file)
     try:
-        return Path(path).read_text(encoding="utf-8-sig")
+        text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(unreadable(error), where=str(path), remedy=remedy) from error
-
-
-def numbered_cells(file: Path, text: str) -> list[tuple[int, list[str]]]:
-    """The lines of a table, each with its number and its cells; remarks and empty lines are passed over.
-    Cells are parted by what the first line has of semicolon, tab and comma, where it has none of them by
-    blanks. Raises InputError where a line is no row of its own: a quotation mark that isn't closed runs on
-    over the lines that follow."""
+        raise InputError(unreadable(error), where=str(file), remedy=remedy) from error
     kept = [
         (number, line)
         for number, line in enumerate(text.splitlines(), 1)
@@ -98,7 +95,7 @@ def read_table(
     Raises InputError naming file, line and column.
     """
     file = Path(path)
-    lines = numbered_cells(file, text_of(path, _TABLE))
+    lines = numbered_cells(file)
     columns = f"Columns: {', '.join(needed)}" + (f"; if wanted {', '.join(optional)}." if optional else ".")
     if not lines:
         raise InputError("is empty", where=str(file), remedy=columns)
@@ -132,7 +129,7 @@ def read_table(
 
 def has_column(path: str | Path, name: str) -> bool:
     """Whether the first line of a file that can be read names the column."""
-    lines = numbered_cells(Path(path), text_of(path, _TABLE))
+    lines = numbered_cells(Path(path))
     return bool(lines) and name in names_in(lines[0][1])
 
 

@@ -76,6 +76,16 @@ class Adjustment(Record):
     misfit_after: float
     halved: int
 
+    @property
+    def cables(self) -> int:
+        """How many are turned."""
+        return int(np.count_nonzero(self.turns))
+
+    @property
+    def turns_in_all(self) -> int:
+        """Steps of all cables, whichever way."""
+        return int(np.abs(self.turns).sum())
+
     def schedule(self, shell: Gridshell) -> str:
         """What the crew does, cable after cable, as CSV: number among the design's own cables, as in drawings
         and model files, both nodes, turns (negative: tighten), change in mm, tension afterwards in N.
@@ -96,12 +106,11 @@ class Adjustment(Record):
 @dataclass(frozen=True, eq=False)
 class Replay(Record):
     """A loop of survey and adjustment played on a grid whose true lengths are known: the true sum of squares
-    of distances to the goal `misfits` (r + 1,), m², before and after every round, the `adjustments` (r,), the
-    `cables` touched in each, and the true `state` in the end."""
+    of distances to the goal `misfits` (r + 1,), m², before and after every round, the `adjustments` (r,), and
+    the true `state` in the end."""
 
     misfits: Reals
     adjustments: tuple[Adjustment, ...]
-    cables: Indices
     state: State
 
     @property
@@ -110,9 +119,7 @@ class Replay(Record):
         return float(1.0 - self.misfits[-1] / self.misfits[0])
 
 
-def first_belief(
-    shell: Gridshell, design: Design, state: State, load: Reals, *, length_error: float
-) -> Belief:
+def first_belief(design: Design, state: State, load: Reals, *, length_error: float) -> Belief:
     """What is believed before the first survey: lengths as drawn with the usual error `length_error`, m (one
     standard deviation), of a cable; `state` is the design's equilibrium under the `load`."""
     PLACE_DEVIATION.require(length_error, where="--length-error")
@@ -139,7 +146,7 @@ def learn(shell: Gridshell, belief: Belief, nodes: Indices, survey: Reals, *, no
         raise InputError(
             "no node was seen", where="survey", remedy="Give at least one node a measured place."
         )
-    require_number(noise, above=0.0, where="noise", give="metres a coordinate, such as 0.0002")
+    check_noise(noise)
     goal, marked = measured[seen].ravel(), marked[seen]
     assembly = assemble(shell.network(belief.design))
     present = belief.design.present
@@ -290,12 +297,7 @@ def replay(
         belief = replace(step.belief, covariance=step.belief.covariance + slack)
         misfits.append(float(((state.positions - wanted) ** 2).sum()))
         done.append(step)
-    return Replay(
-        np.array(misfits),
-        tuple(done),
-        np.array([np.count_nonzero(each.turns) for each in done], dtype=np.int64),
-        state,
-    )
+    return Replay(np.array(misfits), tuple(done), state)
 
 
 def _rates(shell: Gridshell, assembly: Assembly, design: Design, state: State) -> Reals:

@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.errors import InputError
 from shellform.site import measurements
-from shellform.site.measurements import names_in, numbered_cells, text_of, too_many_cells
+from shellform.site.measurements import names_in, numbered_cells, too_many_cells
 from shellform.structure.elements.state import State
 from shellform.surface.units import unit_factor
 
@@ -94,7 +94,7 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
     are passed over. Raises InputError."""
     metres = unit_factor(unit, where="scan.unit")
     file = Path(path)
-    rows = numbered_cells(file, text_of(path, "Give a text file: x, y, z of a point in each line."))
+    rows = numbered_cells(file, "Give a text file: x, y, z of a point in each line.")
     columns = [0, 1, 2]
     names = names_in(rows[0][1]) if rows else []
     named = {"x", "y", "z"} <= set(names)

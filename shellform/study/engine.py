@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from shellform.errors import InputError, NotConverged, not_installed
+from shellform.structure.elements.threads import granted_cores
 from shellform.study.jobs import Job
 from shellform.study.outcome import Outcome, Status
 
@@ -88,8 +89,8 @@ def engine(
     InputError where a cluster doesn't answer and for more than 8 workers a core, NoWorkers where processes
     can't be begun.
     """
-    if workers is not None and workers > _MOST * _cores():
-        what = f"at most {_MOST} for each of the {_cores()} cores"
+    if workers is not None and workers > _MOST * granted_cores():
+        what = f"at most {_MOST} for each of the {granted_cores()} cores"
         raise InputError(
             what, where="--workers", value=workers, remedy="Leave it out: one a core is fastest."
         )
@@ -115,7 +116,7 @@ def engine(
         before = {name: os.environ.get(name) for name in _ONE_THREAD}
         try:
             cluster = LocalCluster(
-                n_workers=workers or _cores(),
+                n_workers=workers or granted_cores(),
                 threads_per_worker=1,
                 memory_limit="auto"
                 if processes
@@ -394,7 +395,3 @@ def _reason(error: Exception) -> str:
     if isinstance(error, KilledWorker):
         return f"took {_DEATHS + 1} workers with it: out of memory, or a fault in a library"
     return f"{type(error).__name__}: {error}"
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -20,12 +20,14 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
+from functools import reduce
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from pydantic import TypeAdapter, ValidationError
 
 from shellform.errors import InputError, not_installed
+from shellform.records.checks import BUILT
 from shellform.records.files import plain
 from shellform.study.outcome import TRIED_AGAIN, ListedDesign, Outcome, Value
 from shellform.tables import Table, table_text
@@ -34,7 +36,7 @@ from shellform.written import whole, write_text
 _OUTCOME = TypeAdapter(Outcome)
 _GROUP = 4096  # rows of a row group, and all that are in memory at once
 _KINDS = {"bool": 0, "int": 1, "float": 2, "str": 3}
-_BUILT = ("polished", "rounded", "optimised", "initial")
+_BUILT = (*reversed(BUILT), "initial")
 
 
 class Log:
@@ -137,10 +139,7 @@ class Log:
         self._places[key] = place
         (self._unsettled.add if outcome.status in TRIED_AGAIN else self._unsettled.discard)(key)
         for name, value in outcome.values.items():
-            kind = _KINDS[type(value).__name__]
-            known = self.kinds.get(name, kind)
-            # Booleans among numbers become numbers.
-            self.kinds[name] = kind if kind == known else max(kind, known, 2)
+            self.kinds[name] = _common(self.kinds.get(name), _KINDS[type(value).__name__])
 
 
 def _line(outcome: Outcome) -> bytes:
@@ -214,8 +213,7 @@ def write_table(folder: Path, log: Log, columns: Mapping[str, str]) -> int:
     own: dict[str, int] = {}
     for design in designs_of(folder / "designs.jsonl"):
         for name, value in design.own.items():
-            kind = _KINDS[type(value).__name__]
-            own[name] = kind if own.get(name, kind) == kind else max(kind, own[name], 2)
+            own[name] = _common(own.get(name), _KINDS[type(value).__name__])
     types = [pa.bool_(), pa.int64(), pa.float64(), pa.string()]
     names = sorted(log.kinds)
     picks = {name: _kind_of_pick(path, log.kinds) for name, path in columns.items()}
@@ -254,13 +252,15 @@ def _cell(value: Any, kind: int) -> Any:
     return float(value) if kind == 2 and value is not None else value
 
 
+def _common(known: int | None, kind: int) -> int:
+    """The kind of a column that has values of both; booleans among numbers become numbers."""
+    return kind if known is None or known == kind else max(known, kind, 2)
+
+
 def _kind_of_pick(path: str, kinds: Mapping[str, int]) -> int:
-    known = {
-        kinds[name]
-        for name in (path.replace("designs.best.", f"designs.{each}.") for each in _BUILT)
-        if name in kinds
-    }
-    return 2 if not known else known.pop() if len(known) == 1 else max(*known, 2)
+    names = (path.replace("designs.best.", f"designs.{each}.") for each in _BUILT)
+    known = [kinds[name] for name in names if name in kinds]
+    return reduce(_common, known) if known else 2
 
 
 def _groups(folder: Path, log: Log, columns: Mapping[str, str]) -> Iterator[list[dict[str, Any]]]:

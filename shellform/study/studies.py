@@ -30,7 +30,7 @@ import shellform
 from shellform.case.case import Case, check_script
 from shellform.errors import InputError, NotConverged, require_file
 from shellform.records.stages import STAGES
-from shellform.run.folder import alone
+from shellform.run.folder import alone, refuse_links
 from shellform.run.keys import stage_keys
 from shellform.study.engine import Engine, Manned, NoWorkers, Work, engine, sweep
 from shellform.study.front import Front, signed
@@ -131,11 +131,7 @@ def run_study(
     plan = read_study(file)
     arrow()  # before hours are spent on designs
     place = Path(folder).resolve()
-    for part in WRITTEN:
-        if (place / part).is_symlink():
-            raise InputError(
-                "is a symbolic link, which isn't followed", where=str(place / part), remedy="Delete it."
-            )
+    refuse_links(place, WRITTEN)
     _refuse_overwriting(place, Path(file))
     try:
         with alone(place), Log(place / "results.jsonl") as log:

@@ -32,6 +32,7 @@ from shellform.surface.readers.draft import Draft, require_mesh_size
 from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.script import function_of, load_script, named_dimensions
 from shellform.surface.readers.stated import line_without_number
+from shellform.surface.shape.triangles import open_edges
 from shellform.surface.units import level_axes, turned_up, unit_factor
 
 if TYPE_CHECKING:  # target.py loads numba, which a reader's process does without
@@ -339,8 +340,6 @@ def _stretches(edge: Reals) -> list[range]:
 
 
 def _on_edge(triangles: Indices, count: int) -> Flags:
-    edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
-    pairs, uses = np.unique(edges, axis=0, return_counts=True)
     result = np.zeros(count, dtype=bool)
-    result[pairs[uses == 1].ravel()] = True
+    result[open_edges(triangles).ravel()] = True
     return result

@@ -25,6 +25,7 @@ from shellform.arrays import Flags, Indices, Reals, flags, indices, reals
 from shellform.errors import InputError, NotConverged, require_number
 from shellform.surface.bounded import bounded_minimum
 from shellform.surface.readers.draft import require_mesh_size
+from shellform.surface.shape.triangles import counted_edges, vertex_areas
 
 if TYPE_CHECKING:  # which load gmsh and numba
     from shellform.surface.shape.target import Surface
@@ -108,8 +109,6 @@ def _raised(
             value=load,
             remedy='Give "surface" for a layer of even thickness, "plan" for what weighs evenly in plan.',
         )
-    from shellform.surface.shape.target import vertex_areas
-
     free = ~held
     solver = _definite(_stiffness(len(place), ends, density)[free][:, free])
     shape = np.column_stack([place, np.zeros(len(place))])
@@ -213,7 +212,7 @@ def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least
     `least` of their mean, so that all stays in compression. Raises InputError where nothing is held, where
     the ground isn't below the surface's top, and where `least` isn't above 0 and at most 1.
     """
-    from shellform.surface.shape.target import make_surface, vertex_areas
+    from shellform.surface.shape.target import make_surface
 
     points, faces = surface.vertices, surface.triangles
     top = float(points[:, 2].max())
@@ -229,9 +228,7 @@ def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least
             value=ground,
             remedy="State its height.",
         )
-    edges = np.unique(
-        np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0
-    )
+    edges, _ = counted_edges(faces)
     weight = np.column_stack([np.zeros((len(points), 2)), -vertex_areas(points, faces)])
     density = fitted_densities(points, edges, weight, held, least=least)
     return make_surface(

@@ -18,6 +18,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, ShellformError
 from shellform.surface.readers.draft import require_mesh_size
+from shellform.surface.shape.triangles import area_vectors, used_points
 from shellform.surface.units import turned_up
 
 if TYPE_CHECKING:  # target.py loads numba, which a reader's process does without
@@ -230,10 +231,8 @@ def mesh_faces(
         _add_normals(normals, points, mine, face, number)
     faces = np.vstack(list(triangles.values()))
     length = np.linalg.norm(normals, axis=1)  # zero where no face knows it
-    used = np.zeros(len(points), dtype=bool)
-    used[faces.ravel()] = True
-    points, faces = points[used], (np.cumsum(used) - 1)[faces]
-    normals, known = normals[used], length[used] > 0.5
+    used, faces = used_points(faces, len(points))
+    points, normals, known = points[used], normals[used], length[used] > 0.5
     normals[~known] = 0.0
     return points, faces, normals if known.any() else None
 
@@ -260,9 +259,7 @@ def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, n
     if not len(triangles) or len(parameters) != 2 * len(tags):
         return
     exact = np.reshape(gmsh.model.getNormal(face, parameters), (-1, 3))
-    corner = points[triangles]
-    rough = np.zeros_like(points)
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    rough, across = np.zeros_like(points), area_vectors(points, triangles)
     for k in range(3):
         np.add.at(rough, triangles[:, k], across)
     rows = number[tags]

@@ -138,15 +138,14 @@ def test_how_far_off_is_told_in_millimetres_and_is_bad_where_the_shell_does_not_
 def test_slack_cables_are_named_up_to_eight_and_the_others_counted():
     names = tuple(f"C{k}" for k in range(11))
     main = replace(MORE, slack=names[:8])
-    row = SimpleNamespace(loads={"none": replace(MORE, slack=names)})
-    assert first_answers._slack(main, row) == (
+    assert first_answers._slack(main, replace(MORE, slack=names)) == (
         "; slack before any load: C0, C1, C2, C3, C4, C5, C6, C7 and 3 more"
         "; slack under it: C0, C1, C2, C3, C4, C5, C6, C7"
     )
-    none = SimpleNamespace(loads={"none": replace(MORE, slack=())})
+    none = replace(MORE, slack=())
     assert first_answers._slack(replace(MORE, slack=()), none) == "; none slack before the load"
     assert first_answers._slack(replace(MORE, slack=("C3",)), none) == "; slack under it: C3"
-    assert first_answers._slack(MORE, SimpleNamespace(loads={})) == ""
+    assert first_answers._slack(MORE, None) == ""
     assert first_answers._slack(None, None) == ""
 
 

@@ -131,8 +131,7 @@ def test_a_stretch_is_off_by_its_ends_motion_less_the_cable_s_own_error_and_by_t
         seen.append((there is state, load.any(), some, shapes))
         return SimpleNamespace(translations=moved)
 
-    monkeypatch.setattr(guide_module, "variables", lambda _members, seed, number: (seed, number))
-    monkeypatch.setattr(guide_module, "errors_of", lambda _members, _tolerances, z: z)
+    monkeypatch.setattr(guide_module, "draw_errors", lambda _members, _tolerances, *drawn: drawn)
     monkeypatch.setattr(guide_module, "moved_from", moved_from)
     longer = {(4, 0): 0.001, (4, 1): 0.003}
     monkeypatch.setattr(

@@ -398,11 +398,10 @@ def test_drawn_structures_are_loaded_number_by_number_and_counted(monkeypatch, w
         return SimpleNamespace(stands=how["number"] % 3 != 0)
 
     monkeypatch.setattr(made, "load", load)
-    monkeypatch.setattr(standing, "variables", lambda members, seed, number: (members, seed, number))
-    monkeypatch.setattr(standing, "errors_of", lambda members, tolerances, z: (tolerances, z))
+    monkeypatch.setattr(standing, "draw_errors", lambda *given: given)
     made.load_numbers("rough", seed=4, numbers=[5, 2], step=0.5, marks=(0.8,), resting=0.3)
     assert sorted(heard, key=lambda each: each[1]["number"]) == [
-        (("rough", ("members", 4, k)), {"number": k, "step": 0.5, "marks": (0.8,), "resting": 0.3})
+        (("members", "rough", 4, k), {"number": k, "step": 0.5, "marks": (0.8,), "resting": 0.3})
         for k in (2, 5)
     ]
     monkeypatch.setattr(standing, "perfect", lambda *given: given)

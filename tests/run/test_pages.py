@@ -171,7 +171,8 @@ def test_another_program_s_file_is_not_written_over_and_a_page_is(copy, tmp_path
     picture.write_bytes(b"\x89PNG\xff")
     with pytest.raises(InputError, match="no page of shellform"):
         write_report([copy], picture)
-    assert write_report([copy]) == write_report([copy])
+    for _ in range(2):
+        assert write_report([copy]) == copy / "report.html"
     with pytest.raises(InputError, match="can't be written"):
         write_report([copy], other / "below" / "page.html")
 

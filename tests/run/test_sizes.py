@@ -323,7 +323,8 @@ def test_sections_are_those_of_a_catalogue_that_is_named_or_of_all_that_are_ship
 )
 def test_what_is_wished_for_can_be(wish, where):
     if where is None:
-        assert DesignWish(**wish) == DesignWish(**wish)
+        made = DesignWish(**wish)
+        assert {name: getattr(made, name) for name in wish} == wish
         return
     with pytest.raises(InputError) as told:
         DesignWish(**wish)

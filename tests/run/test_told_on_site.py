@@ -61,7 +61,7 @@ def test_a_survey_tells_turns_and_how_far_the_grid_is_off_before_and_after(
         state=moved([0.0, 0.02, 0.004]),
     )
     step = SimpleNamespace(
-        turns=np.array(turns), misfit_before=5 * 0.005**2, misfit_after=5 * 0.003**2, halved=halved, belief=now,
+        turns=np.array(turns), cables=np.count_nonzero(turns), turns_in_all=np.abs(turns).sum(), misfit_before=5 * 0.005**2, misfit_after=5 * 0.003**2, halved=halved, belief=now,
         schedule=lambda shell: "turns",
     )  # fmt: skip
     asked = []
@@ -107,7 +107,7 @@ def test_a_replay_tells_what_is_left_after_each_round_and_draws_lengths_of_the_e
 
     def replay(shell, belief, errors, goal, nodes, crew, **how):
         asked.update(how, errors=errors, nodes=nodes.tolist())
-        turns = [SimpleNamespace(turns=np.array([1, -2, 0])), SimpleNamespace(turns=np.array([0, 0, 4]))]
+        turns = [SimpleNamespace(cables=2, turns_in_all=3), SimpleNamespace(cables=1, turns_in_all=4)]
         misfits = [5 * 0.01**2, 5 * 0.004**2, 5 * 0.002**2]
         return SimpleNamespace(misfits=misfits, adjustments=turns, removed=0.96)
 
@@ -248,7 +248,7 @@ def test_the_round_after_goes_on_from_what_was_believed_of_the_same_design_and_l
     monkeypatch.setattr(
         onsite.retensioning,
         "first_belief",
-        lambda shell, own, state, load, *, length_error: (own, load, length_error),
+        lambda own, state, load, *, length_error: (own, load, length_error),
     )
     assert onsite._believed(run, Survey(load="wet", length_error=0.003))[2] == (drawn, "concrete", 0.003)
 

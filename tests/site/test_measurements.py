@@ -193,10 +193,10 @@ def test_noise_is_between_a_nanometre_and_a_metre():
             check_noise(noise)
 
 
-def test_an_open_quotation_mark_is_told_by_its_line(tmp_path):
+def test_an_open_quotation_mark_is_told_by_its_line(written):
     with pytest.raises(InputError, match="line 4: can't be parted"):
-        measurements.numbered_cells(tmp_path / "a.csv", '# "\n1,2\n\n"4,5\n')
-    assert measurements.numbered_cells(tmp_path / "a.csv", '1; "a;b"') == [(1, ["1", "a;b"])]
+        measurements.numbered_cells(written('# "\n1,2\n\n"4,5\n'))
+    assert measurements.numbered_cells(written('1; "a;b"')) == [(1, ["1", "a;b"])]
 
 
 def test_names_in_quotation_marks_as_other_programs_write_them_are_the_columns_own(written):

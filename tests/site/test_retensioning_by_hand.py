@@ -55,13 +55,13 @@ def belief(deviation=(0.01, 0.02, 0.03)):
 
 
 def test_cables_are_believed_to_be_as_long_as_drawn_with_their_usual_error():
-    found = first_belief(SHELL, DESIGN, STATE, LOAD, length_error=0.002)
+    found = first_belief(DESIGN, STATE, LOAD, length_error=0.002)
     np.testing.assert_allclose(found.covariance, 4e-6 * np.eye(3))
     for error in (0.9e-9, 1.1):
         with pytest.raises(InputError, match=r"--length-error.*such as 0\.0001"):
-            first_belief(SHELL, DESIGN, STATE, LOAD, length_error=error)
+            first_belief(DESIGN, STATE, LOAD, length_error=error)
     for error in (1.5e-9, 1.0):
-        assert first_belief(SHELL, DESIGN, STATE, LOAD, length_error=error).covariance[0, 0] == error**2
+        assert first_belief(DESIGN, STATE, LOAD, length_error=error).covariance[0, 0] == error**2
 
 
 def test_a_survey_teaches_what_the_formula_of_the_filter_says(linear):
@@ -182,7 +182,7 @@ def test_a_replay_plays_errors_surveys_and_turns_on_and_tells_what_is_left(linea
     wanted = [((place - PLACES) ** 2).sum() for place in (before, after)]
     np.testing.assert_allclose(played.misfits, wanted)
     assert played.removed == pytest.approx(1.0 - wanted[1] / wanted[0])
-    assert played.cables.tolist() == [2]
+    assert [each.cables for each in played.adjustments] == [2]
     assert len(played.adjustments) == 1
     np.testing.assert_allclose(played.state.positions, after)
     np.testing.assert_allclose(beliefs[1][0].covariance, belief().covariance)
@@ -277,4 +277,4 @@ def test_a_replay_whose_true_grid_leaves_its_branch_says_at_which_of_both_change
 
 
 def test_what_is_removed_is_the_share_of_the_first_misfit():
-    assert Replay(np.array([8.0, 4.0, 2.0]), (), np.zeros(0, dtype=int), STATE).removed == 0.75
+    assert Replay(np.array([8.0, 4.0, 2.0]), (), STATE).removed == 0.75

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from shellform.structure.elements.rotation import (
+    between,
     from_matrices,
     from_vectors,
     identity,
@@ -70,3 +71,11 @@ def test_a_matrix_s_quaternion_has_no_negative_first_part_and_turns_as_the_matri
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, rtol=1e-14)
     np.testing.assert_allclose(matrices(found)[0], turn, atol=1e-14)
     np.testing.assert_allclose(matrices(from_vectors(vector[None]))[0], turn, atol=1e-14)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_between_two_quaternions_the_shorter_way_round_is_gone(sign):
+    first, second, middle = (from_vectors(np.array([about([0, 0, 1], each)])) for each in (10.0, 50.0, 30.0))
+    np.testing.assert_allclose(between(first, sign * second, 0.5), middle, atol=1e-15)
+    both = between(np.vstack([first, first]), sign * np.vstack([second, second]), np.array([[0.0], [1.0]]))
+    np.testing.assert_allclose(both, np.vstack([first, second]), atol=1e-15)

@@ -53,7 +53,7 @@ def test_up_to_eight_workers_a_core_may_be_asked_for(monkeypatch):
         assert how["threads_per_worker"] == 1
         raise Begun
 
-    monkeypatch.setattr(engines, "_cores", lambda: 3)
+    monkeypatch.setattr(engines, "granted_cores", lambda: 3)
     monkeypatch.setattr(distributed, "LocalCluster", begin)
     with pytest.raises(Begun), engines.engine(workers=24):
         pass

@@ -13,9 +13,9 @@ from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.fills import filled
 from shellform.surface.readers.mend import mended
 from shellform.surface.readers.reading import surface_of
-from shellform.surface.readers.seams import open_edges
 from shellform.surface.shape.plate import bent_heights
 from shellform.surface.shape.target import closed_loops
+from shellform.surface.shape.triangles import open_edges
 
 
 def disc(rings, radius=1.0):

@@ -11,7 +11,7 @@ from shellform.errors import InputError
 from shellform.surface.readers import mend
 from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 from shellform.surface.readers.reading import surface_of
-from shellform.surface.readers.seams import open_edges
+from shellform.surface.shape.triangles import open_edges
 from tests.surface.shells import cap, split
 
 POINTS, QUADS = cap()

@@ -7,7 +7,8 @@ import pytest
 
 from shellform.surface.readers import seams
 from shellform.surface.readers.draft import Draft
-from shellform.surface.readers.seams import open_edges, sewn, without_slivers
+from shellform.surface.readers.seams import sewn, without_slivers
+from shellform.surface.shape.triangles import open_edges
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0.0]])
 TWO = np.array([[0, 1, 2], [0, 2, 3]])

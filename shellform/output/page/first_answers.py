@@ -18,7 +18,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.quantities import newtons, number
 from shellform.records.check import SLACK, Cell
-from shellform.records.summary import DesignRecord, LoadRecord, Summary
+from shellform.records.summary import LoadRecord, Summary
 from shellform.records.words import (
     above_words,
     confidence_words,
@@ -67,9 +67,8 @@ def answers(
     design to build, whose check `as_built` says how many drawn structures stand under the additional load;
     `next_size` is the size of the catalogue that its rods would be rounded to; `force_max`, N: what cables
     may pull under load."""
-    row = summary.designs.get(name)
-    main, more = (None if row is None else row.loads.get(load) for load in ("design", "additional"))
-    before = None if row is None else row.loads.get("none")
+    loads = summary.designs[name].loads if name in summary.designs else {}
+    main, more, before = (loads.get(load) for load in ("design", "additional", "none"))
     found = [] if main is None else [_how_far(main, before, shape_notes(summary, name))]
     cables = shell.cables(design)
     pull = cables.tension(states["design"]) if "design" in states else np.zeros(len(cables.ends))
@@ -78,7 +77,7 @@ def answers(
             "How many cables?",
             f"{len(cables.ends)} of {len(shell.cable_ends)}",
             f"{newtons(float(pull.max(initial=0.0)))} at most in one, {newtons(float(pull.sum()))} in all, "
-            f"under the design load{_before(row, force_max)}{_slack(main, row)}",
+            f"under the design load{_before(before, force_max)}{_slack(main, before)}",
         )
     )
     section = shell.rod.resized(design.radius).section
@@ -100,7 +99,7 @@ def answers(
     if more is not None:
         found.append(_is_safe(main, more, as_built, math.isfinite(shell.rod.strength)))
     if shell.net.stretches:
-        found.append(_stands_on(shell.net, more, {} if row is None else row.loads))
+        found.append(_stands_on(shell.net, more, loads))
     heavy, laths = mass_per_length(section) * float(rods.sum()), layers_of(section)
     weight = f" ({number(heavy)} kg)" if heavy > 0.0 else ""
     cut_to = None if summary.documents is None else summary.documents.cut_lengths
@@ -126,23 +125,21 @@ def _beams(shell: Gridshell) -> str:
     return f", {count} of {length} m in all{weight}, {label(shell.edge.section)}"
 
 
-def _before(row: DesignRecord | None, force_max: float | None) -> str:
+def _before(before: LoadRecord | None, force_max: float | None) -> str:
     """How much a cable pulls at most before any load, beside what it may pull."""
-    told = above_words(None if row is None else row.loads.get("none"), force_max)
+    told = above_words(before, force_max)
     return f"; {told}" if told else ""
 
 
-def _slack(main: LoadRecord | None, row: DesignRecord | None) -> str:
+def _slack(main: LoadRecord | None, before: LoadRecord | None) -> str:
     """Which cables hang slack, before the load and under it."""
-    before = None if row is None or "none" not in row.loads else row.loads["none"].slack
     found = [
-        f"{'slack ' + when}: {listed(names)}"
-        for when, names in [("before any load", before), ("under it", None if main is None else main.slack)]
-        if names
+        f"; slack {when}: {listed(load.slack)}"
+        for when, load in [("before any load", before), ("under it", main)]
+        if load is not None and load.slack
     ]
-    return "".join(f"; {each}" for each in found) or (
-        "; none slack before the load" if before is not None else ""
-    )
+    none = before is not None and before.slack is not None
+    return "".join(found) or ("; none slack before the load" if none else "")
 
 
 def _stands_on(net: Net, more: LoadRecord | None, loads: Mapping[str, LoadRecord]) -> Answer:
@@ -153,17 +150,10 @@ def _stands_on(net: Net, more: LoadRecord | None, loads: Mapping[str, LoadRecord
     words = ", ".join(f"{number(length)} m {_EDGES[kind]}" for kind, length in lengths.items())
     used = None if more is None else more.edge_utilisation_max
     beams = f"; edge beams, drawn dark, at {100 * used:.0f} % of their strength" if net.edges and used else ""
-    needs = [
-        f"{what} {newtons(most)}"
-        for what, most in (
-            ("held down with up to", max((each.uplift_max or 0.0 for each in loads.values()), default=0.0)),
-            (
-                "pushed sideways by up to",
-                max((each.thrust_max or 0.0 for each in loads.values()), default=0.0),
-            ),
-        )
-        if most > 0.0
-    ]
+    uplift = max((each.uplift_max or 0.0 for each in loads.values()), default=0.0)
+    thrust = max((each.thrust_max or 0.0 for each in loads.values()), default=0.0)
+    wanted = [("held down with up to", uplift), ("pushed sideways by up to", thrust)]
+    needs = [f"{what} {newtons(most)}" for what, most in wanted if most > 0.0]
     taken = f", {' and '.join(needs)} each, erected or loaded" if needs else ""
     return Answer("What does its edge stand on?", words, f"{len(net.supports)} supports{taken}{beams}")
 

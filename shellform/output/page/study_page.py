@@ -115,16 +115,8 @@ def study_page(study: StudyContent) -> str:
 
 def spread(keys: Sequence[str], most: int = 24) -> list[str]:
     """At most so many of a front's keys, evenly spread along it."""
-    return (
-        [
-            keys[k]
-            for k in sorted(
-                set(np.linspace(0, len(keys) - 1, min(most, len(keys))).round().astype(int).tolist())
-            )
-        ]
-        if keys
-        else []
-    )
+    at = np.linspace(0, len(keys) - 1, min(most, len(keys))).round().astype(int)
+    return [keys[k] for k in np.unique(at)]
 
 
 def chosen(count: int, front: Sequence[int]) -> list[int]:

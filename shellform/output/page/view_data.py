@@ -19,9 +19,11 @@ from shellform.arrays import Indices, Reals, Record
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import rod_names
 from shellform.net.net import Net
+from shellform.output.pictures.maps import worst_at_nodes
 from shellform.output.pictures.panel import marked_nodes, scale_end
 from shellform.problem.paths import deviations
 from shellform.records import words
+from shellform.site.erection_steps import turn_in_plan
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
 
@@ -80,7 +82,7 @@ def view_data(viewed: ViewedShell) -> dict[str, Any]:
     """What the script draws."""
     shell, grid = viewed.shell, viewed.shell.net.grid
     place = shell.target.positions
-    middle = _middle(shell)
+    middle = _middle(place)
     joint_of = {int(node): k for k, pair in enumerate(grid.crossing_nodes) for node in pair}
     vertices, triangles = (
         (np.zeros((0, 3)), np.zeros((0, 3))) if viewed.surface is None else _light(viewed.surface)
@@ -120,10 +122,10 @@ def _design(viewed: ViewedShell, name: str) -> dict[str, Any]:
     cables = shell.cables(design)
     states = {}
     for load, state in viewed.states[name].items():
-        use = _utilisation(shell, design, state)
+        use = worst_at_nodes(shell.net, shell.bending_utilisation(design, state))
         away = deviations(shell, state)
         states[load] = {
-            "positions": _floats(state.positions - _middle(shell)),
+            "positions": _floats(state.positions - _middle(shell.target.positions)),
             "utilisation": _floats(use),
             "length": np.round(1e3 * cables.lengths(state), 4).tolist(),
             "force": [_short(value) for value in cables.tension(state)],
@@ -146,9 +148,8 @@ def net_data(net: Net, title: str, told: str, cable_ends: Indices) -> dict[str, 
     """The same of a net that bears nothing yet, or of a gridshell's target: coloured by its rods' curvature,
     1/m, with all candidate cables slack; `told` is said of it."""
     grid, place = net.grid, net.target.positions
-    middle = 0.5 * (place.min(axis=0) + place.max(axis=0))
-    bent = np.zeros(net.node_count)
-    np.maximum.at(bent, grid.rod_ends, net.curvature)
+    middle = _middle(place)
+    bent = worst_at_nodes(net, net.curvature)
     joint_of = {int(node): k for k, pair in enumerate(grid.crossing_nodes) for node in pair}
     count = len(cable_ends)
     lengths = np.linalg.norm(place[cable_ends[:, 1]] - place[cable_ends[:, 0]], axis=1)
@@ -218,27 +219,17 @@ def _before(net: Net, place: Reals) -> Reals:
 
 
 def laid_out(flat: Reals, place: Reals) -> Reals:
-    """The flat grid (n, 3), m, turned and moved in plan to where it lies nearest to `place` (n, 3) (Kabsch
-    1976, in two dimensions), on the level of its lowest point."""
+    """The flat grid (n, 3), m, turned and moved in plan to where it lies nearest to `place` (n, 3), on the
+    level of its lowest point."""
     first, second = (each[:, :2] - each[:, :2].mean(axis=0) for each in (flat, place))
-    left, _, right = np.linalg.svd(first.T @ second)
-    turn = left @ np.diag([1.0, np.linalg.det(left @ right)]) @ right
+    angle = turn_in_plan(first, second)
+    turn = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
     level = place[:, 2].min() + flat[:, 2] - flat[:, 2].min()
     return np.column_stack([first @ turn + place[:, :2].mean(axis=0), level])
 
 
-def _middle(shell: Gridshell) -> Reals:
-    place = shell.target.positions
-    return np.asarray(0.5 * (place.min(axis=0) + place.max(axis=0)))
-
-
-def _utilisation(shell: Gridshell, design: Design, state: State) -> Reals:
-    """Bending stress over strength (n,) at each node, the larger of its elements' ends; 0 where the strength
-    isn't known.
-    """
-    use = np.zeros(shell.node_count)
-    np.maximum.at(use, shell.net.grid.rod_ends, shell.bending_utilisation(design, state))
-    return use
+def _middle(place: Reals) -> Reals:
+    return 0.5 * (place.min(axis=0) + place.max(axis=0))
 
 
 def _light(surface: Surface) -> tuple[Reals, Any]:

@@ -69,7 +69,7 @@ def _values(net: Net, name: str) -> Reals:
     if name == "distance":
         return along_rods(net, np.abs(quality.distance))
     if name == "curvature":
-        return worst_at_nodes(net, np.linalg.norm(quality.curvature, axis=2))
+        return worst_at_nodes(net, net.curvature)
     if name == "skew":
         return along_rods(net, np.abs(0.5 * np.pi - quality.shear_angle))
     return np.abs(quality.pull)

@@ -26,6 +26,7 @@ from shellform.output.pictures.panel import (
 )
 from shellform.output.pictures.sheets import Canvas, Drawing
 from shellform.output.pictures.view import Camera
+from shellform.surface.shape.triangles import area_vectors, directed_edges
 
 _BANDS = 12  # of depth, between which arrows stand
 _OUTLINE = 1.2  # pixels
@@ -131,11 +132,8 @@ def _outline(skin: Skin, camera: Camera) -> NDArray[np.int64]:
     """The edges (e, 2) at which the surface ends, and those between a face that looks to the eye and one that
     looks away.
     """
-    corner = skin.vertices[skin.triangles]
-    facing = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) @ camera.away > 0.0
-    edges = np.sort(
-        np.vstack([skin.triangles[:, [0, 1]], skin.triangles[:, [1, 2]], skin.triangles[:, [2, 0]]]), axis=1
-    )
+    facing = area_vectors(skin.vertices, skin.triangles) @ camera.away > 0.0
+    edges = np.sort(directed_edges(skin.triangles), axis=1)
     found, where, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     fronts = np.bincount(where.ravel(), weights=np.tile(facing, 3), minlength=len(found))
     return found[(count == 1) | ((fronts > 0) & (fronts < count))]

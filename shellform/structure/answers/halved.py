@@ -126,10 +126,7 @@ def with_middles(state: State, beams: Beams, cut: Indices) -> State:
     ]
     middle = 0.5 * (one + other) + 0.125 * (along[0] - along[1])
     tangent = 1.5 * (other - one) - 0.25 * (along[0] + along[1])
-    first, second = state.quaternions[a], state.quaternions[b]
-    same = np.where((first * second).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
-    half = first + same * second
-    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    half = rotation.between(state.quaternions[a], state.quaternions[b], 0.5)
     half = _turned_along(half, axis, tangent)
     return State(np.vstack([state.positions, middle]), np.vstack([state.quaternions, half]))
 

@@ -46,6 +46,14 @@ def product(left: Reals, right: Reals) -> Reals:
     return result / np.linalg.norm(result, axis=1, keepdims=True)
 
 
+def between(first: Reals, second: Reals, share: Reals | float) -> Reals:
+    """Unit quaternions (k, 4) between two, at a `share` of the way (k, 1) from the first to the second, the
+    shorter way round."""
+    near = np.where(np.sum(first * second, axis=1, keepdims=True) >= 0.0, second, -second)
+    mixed = (1.0 - share) * first + share * near
+    return np.asarray(mixed / np.linalg.norm(mixed, axis=1, keepdims=True))
+
+
 @njit(cache=True, error_model="numpy")
 def turned(vectors, quaternions):  # type: ignore[no-untyped-def]
     """The quaternions (k, 4) turned further by the rotation vectors (k, 3), rad: `product` of `from_vectors`

@@ -27,12 +27,15 @@ _OWN = threading.local()  # `taken` in a thread whose siblings keep the other co
 
 
 def cores() -> int:
-    """How many cores this process may use: OMP_NUM_THREADS where it is set, else those that the system
-    grants.
-    """
+    """How many cores this process may use: OMP_NUM_THREADS where it is set, else those that it is granted."""
     asked = os.environ.get("OMP_NUM_THREADS", "")
     if asked.isdigit() and int(asked) > 0:
         return int(asked)
+    return granted_cores()
+
+
+def granted_cores() -> int:
+    """How many cores the system grants to this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

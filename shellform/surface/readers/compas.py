@@ -10,7 +10,6 @@ tables, as force density programs write): the faces between its lines are the sh
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -21,7 +20,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many
-from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
+from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined, told_apart
 from shellform.surface.readers.network_faces import faces_in_plan
 
 _SHELL, _FORCES = "ThrustDiagram", "ForceDiagram"
@@ -112,14 +111,9 @@ def _told_apart(
 ) -> list[tuple[str, dict[str, Any]]]:
     """The objects by names of which none is empty and none there twice, where there are several; without
     those called `but`, unless all are. Each keeps its number whether these are left out or not."""
-    times = Counter(name for name, _ in found)
-    alike = len(found) > 1 and (max(times.values()) > 1 or "" in times)
-    apart = [
-        (name if not alike or (name and times[name] < 2) else f"{name or 'mesh'} {k}", table)
-        for k, (name, table) in enumerate(found, 1)
-    ]
+    apart = told_apart([name for name, _ in found], "mesh")
     kept = [k for k, (name, _) in enumerate(found) if name != but] or list(range(len(found)))
-    return [found[k] for k in kept] if len(kept) == 1 else [apart[k] for k in kept]
+    return [found[k] for k in kept] if len(kept) == 1 else [(apart[k], found[k][1]) for k in kept]
 
 
 def _part(name: str, table: dict[str, Any]) -> tuple[MeshObject, int]:

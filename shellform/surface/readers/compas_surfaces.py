@@ -9,7 +9,6 @@ a difference, it is told.
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +18,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, among, called, check_points
+from shellform.surface.readers.draft import Choice, Draft, among, called, check_points, told_apart
 from shellform.surface.readers.nurbs import Patch, with_end_knots
 from shellform.surface.units import unit_factor
 
@@ -69,14 +68,10 @@ def read_compas_surfaces(
     from shellform.surface import cad
 
     found = list(surface_tables(json.loads(file.read_text(encoding="utf-8"))))
-    counts: Counter[str] = Counter(name for name, _ in found)
-    named = [
-        (name if name and counts[name] < 2 else f"{name or 'surface'} {number}", table)
-        for number, (name, table) in enumerate(found, 1)
-    ]
-    kept = among([("", name) for name, _ in named], choice, str(file))
+    names = told_apart([name for name, _ in found], "surface")
+    kept = among([("", name) for name in names], choice, str(file))
     read = []
-    for (name, table), meant in zip(named, kept, strict=True):
+    for name, (_, table), meant in zip(names, found, kept, strict=True):
         if meant:
             try:
                 read.append(_patch(table, unit_factor(unit or "m"), f"{file}, {name}"))
@@ -89,9 +84,9 @@ def read_compas_surfaces(
     draft = cad.mesh_patches(
         [patch for patch, _ in read], size=size, up=up, face=face, where=file, before_mesh=before_mesh
     )
-    names = tuple(called("", name) for (name, _), meant in zip(named, kept, strict=True) if meant)
+    objects = tuple(called("", name) for name, meant in zip(names, kept, strict=True) if meant)
     notes = (*draft.notes, _ROWS) if any(either for _, either in read) else draft.notes
-    return replace(draft, notes=notes, objects=names)
+    return replace(draft, notes=notes, objects=objects)
 
 
 def _patch(table: dict[str, Any], factor: float, where: str) -> tuple[Patch, bool]:

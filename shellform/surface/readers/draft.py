@@ -7,13 +7,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many, require_number
 from shellform.quantities import LENGTHS, if_other_unit
+from shellform.surface.shape.triangles import area_vectors, used_points
 
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000  # of one surface: they take 4 GB (allowance.py)
@@ -38,6 +39,13 @@ class Draft(Record):
     up: str = "z"
     notes: tuple[str, ...] = ()
     objects: tuple[str, ...] = ()
+
+
+def without_unused(draft: Draft) -> Draft:
+    """The draft without points that no triangle has."""
+    used, faces = used_points(draft.triangles, len(draft.points))
+    normals = None if draft.normals is None else draft.normals[used]
+    return replace(draft, points=draft.points[used], triangles=faces, normals=normals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +103,16 @@ def _is_called(name: str, wanted: str) -> bool:
 def called(layer: str, name: str) -> str:
     """What an object is told by: its name, and its layer; "" where it has neither."""
     return " on ".join([*([repr(name)] if name else []), *([f"layer {layer!r}"] if layer else [])])
+
+
+def told_apart(names: Sequence[str], kind: str) -> list[str]:
+    """The names of a file's objects, of which none is empty then and none there twice: with its number, from
+    1, after one that was, or after the `kind`."""
+    times = Counter(names)
+    return [
+        name if name and times[name] < 2 else f"{name or kind} {number}"
+        for number, name in enumerate(names, 1)
+    ]
 
 
 def choosable(draft: Draft) -> str:
@@ -222,8 +240,7 @@ def triangulated(points: Reals, faces: Indices) -> Indices:
 
 def _fold(points: Reals, pairs: Indices) -> Reals:
     """Cosine (f,) of the angle between the normals of two triangles each (f, 2, 3)."""
-    corner = points[pairs]
-    normal = np.cross(corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0])
+    normal = area_vectors(points, pairs)
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-300)
     return np.asarray(np.sum(normal[:, 0] * normal[:, 1], axis=1))
 

@@ -18,9 +18,9 @@ from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.mend import noted
-from shellform.surface.readers.seams import open_edges
 from shellform.surface.shape.plate import bent_heights
 from shellform.surface.shape.target import ON_GROUND, closed_loops, make_surface
+from shellform.surface.shape.triangles import area_vectors, open_edges
 
 _DESCENT = 1.0  # mean slope of a fill down to the ground
 _STEEPEST = 3.0  # mean slope of it at the most
@@ -91,8 +91,7 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
 
 
 def _upwards(draft: Draft) -> Draft:
-    corner = draft.points[draft.triangles]
-    up = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2].sum()
+    up = area_vectors(draft.points, draft.triangles)[:, 2].sum()
     return draft if up >= 0.0 else replace(draft, triangles=draft.triangles[:, ::-1].copy())
 
 

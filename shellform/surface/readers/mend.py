@@ -18,13 +18,14 @@ from scipy.spatial import cKDTree
 from shellform import quantities
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many
-from shellform.surface.readers.draft import Draft, choosable
+from shellform.surface.readers.draft import Draft, choosable, without_unused
 from shellform.surface.readers.seams import sewn, without_slivers
-from shellform.surface.readers.sides import shared_edges, side_of
+from shellform.surface.readers.sides import pieces_of, shared_edges, side_of
 from shellform.surface.readers.teeth import without_teeth
+from shellform.surface.shape.triangles import counted_edges, directed_edges, triangle_areas
 
 _SAME = 1e-8  # of the size: vertices nearer than that are one
-_FLAT = 1e-9  # of the squared size: a surface smaller than that has no area
+_FLAT = 5e-10  # of the squared size: a surface smaller than that has no area
 _FURTHEST = 1e9  # m from the origin
 _PIECES_TOLD = 5  # the largest ones, in one message
 _PARTED = 1e-6  # of the size: how far the two sides of a parted vertex move into their faces
@@ -46,9 +47,7 @@ def mended(draft: Draft, where: str, *, face: str | None = None, piece: int | No
     if not size > 0.0:
         raise InputError("has no extent", where=where, remedy="Export the surface as a mesh.")
     draft = _merged(draft, size)
-    corner = draft.points[draft.triangles]
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum()
-    if not area > _FLAT * size * size:
+    if not triangle_areas(draft.points, draft.triangles).sum() > _FLAT * size * size:
         raise InputError(
             "the mesh has no triangle with an area", where=where, remedy="Export the surface as a mesh."
         )
@@ -89,7 +88,8 @@ def turned_alike(triangles: Indices, where: str) -> Indices:
         raise InputError(
             "the surface has one side only, like a Möbius strip", where=where, remedy="Check the faces."
         )
-    pieces, piece = _pieces(triangles)
+    piece = pieces_of(triangles)
+    pieces = int(piece.max()) + 1
     start = np.zeros(pieces, dtype=np.int64)
     start[piece[::-1]] = np.arange(count)[::-1]
     turned = label[:count] != label[start[piece]]
@@ -104,10 +104,12 @@ def _merged(draft: Draft, size: float) -> Draft:
     """Vertices at one place merged, whatever their last digits; no triangle without area or given twice; no
     vertex without triangle.
     """
-    unused = without_unused(draft)[1]
+    kept = without_unused(draft)
+    unused = len(draft.points) - len(kept.points)
     if unused:
-        points = how_many(unused, "point of no face was dropped", "points of no face were dropped")
-        draft = noted(without_unused(draft)[0], points)
+        draft = noted(
+            kept, how_many(unused, "point of no face was dropped", "points of no face were dropped")
+        )
     draft = _without_points(draft)
     same = _same_places(draft.points, _SAME * size)
     merged = int((same != np.arange(len(same))).sum())
@@ -125,7 +127,7 @@ def _merged(draft: Draft, size: float) -> Draft:
             len(draft.triangles) - len(once), "face given twice was dropped", "faces given twice were dropped"
         )
         draft = noted(replace(draft, triangles=draft.triangles[np.sort(once)]), note)
-    return without_unused(draft)[0]
+    return without_unused(draft)
 
 
 def _same_places(points: Reals, reach: float) -> Indices:
@@ -158,12 +160,11 @@ def _without_points(draft: Draft) -> Draft:
             replace(draft, triangles=draft.triangles[whole]),
             how_many(int((~whole).sum()), "face without area was dropped", "faces without area were dropped"),
         )
-    return without_unused(draft)[0]
+    return without_unused(draft)
 
 
 def _refuse_branches(draft: Draft, where: str) -> None:
-    edges = np.sort(np.vstack([draft.triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
-    pairs, counts = np.unique(edges, axis=0, return_counts=True)
+    pairs, counts = counted_edges(draft.triangles)
     if (counts > 2).any():
         place = draft.points[pairs[np.argmax(counts > 2), 0]]
         others = choosable(draft)
@@ -177,16 +178,9 @@ def _refuse_branches(draft: Draft, where: str) -> None:
         )
 
 
-def _pieces(triangles: Indices) -> tuple[int, Indices]:
-    """The number of pieces that hang together by edges, and the piece of each triangle (t,)."""
-    first, second, _ = shared_edges(triangles)
-    links = sp.csr_array((np.ones(len(first)), (first, second)), shape=(len(triangles), len(triangles)))
-    count, label = connected_components(links, directed=False)
-    return int(count), label.astype(np.int64)
-
-
 def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
-    count, label = _pieces(draft.triangles)
+    label = pieces_of(draft.triangles)
+    count = int(label.max()) + 1
     if piece is not None and not 1 <= piece <= count:
         raise InputError(
             f"{where} has no such piece",
@@ -196,11 +190,7 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
         )
     if count == 1:
         return draft
-    corner = draft.points[draft.triangles]
-    area = np.bincount(
-        label,
-        0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1),
-    )
+    area = np.bincount(label, triangle_areas(draft.points, draft.triangles))
     order = np.argsort(-area, kind="stable")
     if piece is None:
         others = choosable(draft)
@@ -216,7 +206,7 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
         )
     kept = replace(draft, triangles=draft.triangles[label == order[piece - 1]])
     return noted(
-        without_unused(kept)[0],
+        without_unused(kept),
         f"piece {piece} of {count} was taken, {quantities.number(area[order[piece - 1]])} m²",
     )
 
@@ -243,9 +233,7 @@ def _open(draft: Draft, face: str | None, where: str) -> Draft:
             remedy="Choose its upper or lower face (surface.face, --face), or export that face alone.",
         )
     kept = replace(draft, triangles=draft.triangles[side_of(draft.points, draft.triangles, face, where)])
-    return _one_piece(
-        noted(without_unused(kept)[0], f"the {face} face of a closed skin was taken"), None, where
-    )
+    return _one_piece(noted(without_unused(kept), f"the {face} face of a closed skin was taken"), None, where)
 
 
 def _parted(draft: Draft, size: float) -> Draft:
@@ -255,7 +243,7 @@ def _parted(draft: Draft, size: float) -> Draft:
     faces, count = draft.triangles, len(draft.triangles)
     at = faces.T.ravel()  # corner k of triangle t is row k * count + t
     row = np.arange(3 * count).reshape(3, count)
-    edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    edges = directed_edges(faces)
     ends = np.column_stack(
         [np.concatenate([row[0], row[1], row[2]]), np.concatenate([row[1], row[2], row[0]])]
     )
@@ -303,12 +291,3 @@ def _parted(draft: Draft, size: float) -> Draft:
 def noted(draft: Draft, note: str) -> Draft:
     """The draft with one more note."""
     return replace(draft, notes=(*draft.notes, note))
-
-
-def without_unused(draft: Draft) -> tuple[Draft, int]:
-    """The draft without vertices that no triangle has, and their number."""
-    used = np.zeros(len(draft.points), dtype=bool)
-    used[draft.triangles.ravel()] = True
-    normals = None if draft.normals is None else draft.normals[used]
-    faces = (np.cumsum(used) - 1)[draft.triangles]
-    return replace(draft, points=draft.points[used], triangles=faces, normals=normals), int((~used).sum())

@@ -21,6 +21,7 @@ from shellform.surface.readers.fills import filled
 from shellform.surface.readers.mend import mended, noted
 from shellform.surface.readers.teeth import is_ragged
 from shellform.surface.shape.target import Surface, make_surface
+from shellform.surface.shape.triangles import area_vectors
 from shellform.surface.units import downwards, turned_back, turned_up, unit_factor
 
 ENDINGS = {
@@ -292,8 +293,7 @@ def _content(head: bytes, file: Path) -> str | None:
 
 def _plan_share(points: Reals, triangles: Indices) -> float:
     """Of its area, the plan's: little where a shell lies on its side."""
-    corner = points[triangles]
-    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = area_vectors(points, triangles)
     return abs(float(area[:, 2].sum())) / float(np.linalg.norm(area, axis=1).sum())
 
 

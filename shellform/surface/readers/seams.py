@@ -20,7 +20,13 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Indices, Reals
 from shellform.errors import how_many
 from shellform.quantities import number
-from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.draft import Draft, without_unused
+from shellform.surface.shape.triangles import (
+    area_vectors,
+    directed_edges,
+    open_edges,
+    triangle_areas,
+)
 
 _GAP = 0.1  # of the mean length of open edges
 _MOST_GAP = 1e-3  # of the size
@@ -60,13 +66,6 @@ def sewn(draft: Draft, size: float) -> Draft:
     return replace(draft, notes=notes)
 
 
-def open_edges(triangles: Indices) -> Indices:
-    """The edges (e, 2) that only one triangle has, in its direction."""
-    edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    _, at, counts = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-    return np.asarray(edges[at[counts == 1]])
-
-
 def _in_rounds(
     close: Callable[[Draft, float], tuple[Draft, int, float]], draft: Draft, reach: float
 ) -> tuple[Draft, int, float]:
@@ -87,7 +86,7 @@ def _vertices_joined(draft: Draft, reach: float) -> tuple[Draft, int, float]:
     if not len(pairs):
         return draft, 0, 0.0
     count = len(draft.points)
-    edges = np.sort(np.vstack([draft.triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    edges = np.sort(directed_edges(draft.triangles), axis=1)
     pairs = pairs[~np.isin(pairs.min(axis=1) * count + pairs.max(axis=1), edges[:, 0] * count + edges[:, 1])]
     gap = np.linalg.norm(draft.points[pairs[:, 0]] - draft.points[pairs[:, 1]], axis=1)
     taken = np.zeros(count, dtype=bool)
@@ -102,7 +101,7 @@ def _vertices_joined(draft: Draft, reach: float) -> tuple[Draft, int, float]:
             joined, moved = joined + 1, max(moved, float(gap[k]))
     faces = same[draft.triangles]
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return _compact(draft, points, faces[whole]), joined, moved
+    return without_unused(replace(draft, points=points, triangles=faces[whole])), joined, moved
 
 
 def _edges_cut(draft: Draft, reach: float) -> tuple[Draft, int, float]:
@@ -168,8 +167,7 @@ def _fewer_slivers(draft: Draft) -> tuple[Draft, tuple[int, int, int]]:
     points, faces = draft.points, draft.triangles.copy()
     corner = points[faces]
     sides = np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2)  # side k from corner k to k + 1
-    double = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
-    thin = np.flatnonzero(double < _SLIVER * sides.max(axis=1) ** 2)
+    thin = np.flatnonzero(2.0 * triangle_areas(points, faces) < _SLIVER * sides.max(axis=1) ** 2)
     if not len(thin):
         return draft, (0, 0, 0)
     start, around = _incidence(faces, len(points))
@@ -195,7 +193,7 @@ def _fewer_slivers(draft: Draft) -> tuple[Draft, tuple[int, int, int]]:
         faces[rows[: len(new)]] = new
         done[kind] += 1
         touched[np.unique(draft.triangles[ring])] = True
-    return _compact(draft, points, faces[alive]), (done[0], done[1], done[2])
+    return without_unused(replace(draft, triangles=faces[alive])), (done[0], done[1], done[2])
 
 
 def _incidence(faces: Indices, count: int) -> tuple[Indices, Indices]:
@@ -247,8 +245,7 @@ def _flip(points: Reals, faces: Indices, ring: Indices, t: int, side: int) -> _C
 
 def _turned(points: Reals, old: Indices, new: Indices, allowed: float) -> bool:
     """Whether a triangle that had an area turns over."""
-    corners = points[old], points[new]
-    before, after = (np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]) for c in corners)
+    before, after = area_vectors(points, old), area_vectors(points, new)
     solid = _heights(points, old) > allowed
     return bool((np.sum(before * after, axis=1)[solid] <= 0.0).any())
 
@@ -257,12 +254,4 @@ def _heights(points: Reals, faces: Indices) -> Reals:
     """Height over longest side (f,)."""
     corner = points[faces]
     longest = np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2).max(axis=1)
-    double = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
-    return np.asarray(double / np.maximum(longest, 1e-300) ** 2)
-
-
-def _compact(draft: Draft, points: Reals, faces: Indices) -> Draft:
-    used = np.zeros(len(points), dtype=bool)
-    used[faces.ravel()] = True
-    normals = None if draft.normals is None else draft.normals[used]
-    return replace(draft, points=points[used], triangles=(np.cumsum(used) - 1)[faces], normals=normals)
+    return np.asarray(2.0 * triangle_areas(points, faces) / np.maximum(longest, 1e-300) ** 2)

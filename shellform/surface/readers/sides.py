@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError
+from shellform.surface.shape.triangles import area_vectors, directed_edges
 
 _SHARP = np.cos(np.deg2rad(35.0))  # of the angle between normals: beyond, an edge sets two faces apart
 _ALSO = 0.25  # of the largest face's area in plan: others as large belong to that side too
@@ -24,17 +25,14 @@ def side_of(points: Reals, triangles: Indices, face: str, where: str) -> Flags:
 
     Raises InputError where no sharp edge sets it off from the rest.
     """
-    corner = points[triangles]
-    area = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    if np.sum(area * (corner[:, 0] - points.mean(axis=0))) < 0.0:
+    area = area_vectors(points, triangles)
+    if np.sum(area * (points[triangles[:, 0]] - points.mean(axis=0))) < 0.0:
         area = -area  # turned inwards
     size = np.linalg.norm(area, axis=1)
     unit = area / np.maximum(size, 1e-300)[:, None]
     first, second, _ = shared_edges(triangles)
     smooth = np.sum(unit[first] * unit[second], axis=1) > _SHARP
-    count = len(triangles)
-    links = sp.csr_array((np.ones(int(smooth.sum())), (first[smooth], second[smooth])), shape=(count, count))
-    _, label = connected_components(links, directed=False)
+    label = _linked(first[smooth], second[smooth], len(triangles))
     up = 1.0 if face == "upper" else -1.0
     plan = np.bincount(label, weights=up * area[:, 2])
     best = float(plan.max())
@@ -54,10 +52,22 @@ def shared_edges(triangles: Indices) -> tuple[Indices, Indices, Flags]:
     """The triangles on the two sides of each edge that two share, (e,) and (e,), and whether both pass it in
     the same direction (e,).
     """
-    edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    edges = directed_edges(triangles)
     owner = np.tile(np.arange(len(triangles)), 3)
     low, high = edges.min(axis=1), edges.max(axis=1)
     order = np.lexsort((high, low))
     same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
     first, second = order[:-1][same], order[1:][same]
     return owner[first], owner[second], np.asarray(edges[first, 0] == edges[second, 0])
+
+
+def pieces_of(triangles: Indices) -> Indices:
+    """The piece of each triangle (t,), numbered from 0: what hangs together by edges."""
+    first, second, _ = shared_edges(triangles)
+    return _linked(first, second, len(triangles))
+
+
+def _linked(first: Indices, second: Indices, count: int) -> Indices:
+    """Of `count` triangles the group of each (t,), the `first` (e,) being in one with the `second` (e,)."""
+    links = sp.csr_array((np.ones(len(first)), (first, second)), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)

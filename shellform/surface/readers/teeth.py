@@ -20,7 +20,6 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu, spsolve
 from scipy.spatial import cKDTree
 
@@ -28,9 +27,10 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import how_many
 from shellform.quantities import number
 from shellform.surface.readers.draft import Draft
-from shellform.surface.readers.sides import shared_edges
+from shellform.surface.readers.sides import pieces_of
 from shellform.surface.shape.target import across_edges, closed_loops, rough_normals
 from shellform.surface.shape.tree import Tree
+from shellform.surface.shape.triangles import area_vectors, used_points
 
 _FEWEST = 24  # vertices of an edge with teeth
 _TEETH = 8  # of an edge, at the least
@@ -112,15 +112,14 @@ def _told(draft: Draft, placed: Reals, faces: Indices, track: Tree, edges: int) 
     """The draft of these points (v, 3) and triangles, with a note of how far from the curves the edge was at
     most where it is smooth now."""
     moved = (placed != draft.points).any(axis=1)
-    used = np.zeros(len(moved), dtype=bool)
-    used[faces] = True
+    used, among_used = used_points(faces, len(moved))
     most = float(track.nearest(draft.points[moved | ~used])[2].max())
     told = how_many(edges, "edge was toothed and was smoothed", "edges were toothed and were smoothed")
     given = None if draft.normals is None else np.where(moved[:, None], 0.0, draft.normals)[used]
     return replace(
         draft,
         points=placed[used],
-        triangles=(np.cumsum(used) - 1)[faces],
+        triangles=among_used,
         normals=given,
         notes=(*draft.notes, f"{told}, by {number(most, 2)} m at most"),
     )
@@ -285,17 +284,15 @@ def _on_rim(faces: Indices, count: int) -> Indices:
 
 def _poor(before: Reals, after: Reals, faces: Indices, thin: float) -> tuple[Flags, Flags]:
     """Which triangles (t,) turn over, and which become lower than `thin`, m."""
-    old, new = (np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]) for at in (before[faces], after[faces]))
+    old, new = area_vectors(before, faces), area_vectors(after, faces)
     corner = after[faces]
     longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
-    return np.sum(old * new, axis=1) <= 0.0, np.linalg.norm(new, axis=1) < thin * longest
+    return np.sum(old * new, axis=1) <= 0.0, 2.0 * np.linalg.norm(new, axis=1) < thin * longest
 
 
 def _whole(faces: Indices) -> Indices | None:
     """The triangles of the largest piece that hangs together by sides; None where another is no crumb."""
-    first, second, _ = shared_edges(faces)
-    links = sp.csr_array((np.ones(len(first)), (first, second)), shape=(len(faces), len(faces)))
-    label = connected_components(links, directed=False)[1]
+    label = pieces_of(faces)
     sizes = np.bincount(label, minlength=1)
     others = np.delete(sizes, np.argmax(sizes))
     return None if others.max(initial=0) > _BROKEN_OFF * len(faces) else faces[label == np.argmax(sizes)]

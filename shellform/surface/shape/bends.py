@@ -8,7 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from shellform.surface.shape.target import Surface, curvature, vertex_areas
+from shellform.surface.shape.target import Surface, curvature
+from shellform.surface.shape.triangles import vertex_areas
 
 _SHOWN = 0.95  # of the surface's area keeps the curvature by which cells are sized
 _USUALLY = 0.75  # of its area: what is curved more may be creases, which bear nothing

@@ -10,12 +10,12 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
-from shellform.surface.shape.target import Surface, make_surface, triangle_areas
+from shellform.surface.shape.target import Surface, make_surface
+from shellform.surface.shape.triangles import adjacency, counted_edges, triangle_areas, used_points
 
 _NEAR = 0.2  # of an edge: nearer to where it crosses the level its end is moved there
 _LEFT = 0.7  # of the surface's area above the level in one piece, at the least
@@ -49,8 +49,8 @@ def cut_off(surface: Surface, above: float) -> Surface:
             value=above,
             remedy="Give a lower height, or bring the pieces one by one.",
         )
-    used, number = np.unique(faces, return_inverse=True)
-    result = make_surface(points[used], number.reshape(-1, 3), source=surface.source)
+    used, faces = used_points(faces, len(points))
+    result = make_surface(points[used], faces, source=surface.source)
     told = f"cut off {above - lowest:.3g} m above its lowest point"
     return Surface(
         result.vertices,
@@ -68,11 +68,7 @@ def _snapped(surface: Surface, above: float) -> tuple[Reals, Reals]:
     height = points[:, 2] - above
     size = float(np.ptp(points[:, 2]))
     side = np.where(np.abs(height) <= 1e-9 * size, 0.0, np.sign(height))
-    pairs, times = np.unique(
-        np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1),
-        axis=0,
-        return_counts=True,
-    )
+    pairs, times = counted_edges(faces)
     rim = np.isin(np.arange(len(points)), pairs[times == 1])
     crossed = side[pairs[:, 0]] * side[pairs[:, 1]] < 0.0
     across, along_rim = pairs[crossed], times[crossed] == 1
@@ -117,8 +113,6 @@ def _divided(points: Reals, faces: Indices, side: Reals, above: float) -> tuple[
 
 def _largest(points: Reals, faces: Indices) -> Indices:
     """The triangles of the piece with the largest area."""
-    ones = np.ones(3 * len(faces))
-    links = csr_array((ones, (faces.ravel(), np.roll(faces, 1, axis=1).ravel())), shape=(len(points),) * 2)
-    _, label = connected_components(links, directed=False)
+    _, label = connected_components(adjacency(faces, len(points)), directed=False)
     area = np.bincount(label[faces[:, 0]], weights=triangle_areas(points, faces))
     return faces[label[faces[:, 0]] == int(np.argmax(area))]

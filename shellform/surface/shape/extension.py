@@ -20,6 +20,7 @@ from scipy.sparse.linalg import spsolve
 from shellform.arrays import Indices, Reals
 from shellform.surface.shape.jets import jets
 from shellform.surface.shape.target import Surface, rough_normals
+from shellform.surface.shape.triangles import adjacency
 
 _OPEN = 0.05  # of a cell's width at the edge: the least that it may narrow to
 _STRETCHES = (
@@ -169,10 +170,8 @@ def _lid(surface: Surface, loop: Indices, count: int) -> tuple[Reals, Indices]:
     number[loop] = own + np.arange(size)
     behind = _strip(own + size + np.arange(size), own + np.arange(size))
     local = np.vstack([number[triangles], behind])
-    pairs = np.vstack([local[:, [0, 1]], local[:, [1, 2]], local[:, [2, 0]]])
     total = own + 2 * size
-    graph = sp.csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(total, total))
-    graph = sp.csr_array((graph + graph.T) > 0).astype(float)
+    graph = adjacency(local, total)
     laplacian = sp.csr_array(sp.eye_array(total) - sp.diags_array(1.0 / graph.sum(axis=1)) @ graph)[
         : own + size
     ]

@@ -42,7 +42,8 @@ import scipy.sparse as sp
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, NotConverged, require_number
 from shellform.structure.solve.factorisation import Factor, Symmetric
-from shellform.surface.shape.target import ON_GROUND, Surface, make_surface, rough_normals, vertex_areas
+from shellform.surface.shape.target import ON_GROUND, Surface, make_surface, rough_normals
+from shellform.surface.shape.triangles import area_vectors, directed_edges, vertex_areas
 
 _MESH = 0.3  # of R: edges that aren't longer show its curvature
 _MOST = 30_000  # vertices of the refined mesh
@@ -191,7 +192,7 @@ class _Fit:
 
     def __init__(self, surface: Surface, chosen: Flags) -> None:
         count, faces = len(surface.vertices), surface.triangles
-        pairs = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        pairs = directed_edges(faces)
         ones = np.ones(len(pairs))
         next_to = sp.csr_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
         next_to = sp.csr_array(next_to + next_to.T)
@@ -321,7 +322,7 @@ def _refined(surface: Surface, longest: float) -> Surface:
     for every in (True, False):
         points, faces = surface.vertices, surface.triangles
         while True:
-            pairs = np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+            pairs = np.sort(directed_edges(faces), axis=1)
             edges, number = np.unique(pairs, axis=0, return_inverse=True)
             long = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1) > longest
             if not long.any():
@@ -364,10 +365,7 @@ def _halved(points: Reals, faces: Indices, middle: Indices) -> Indices:
 
 def _refuse_folds(start: Surface, at: Reals, radius: float) -> None:
     """Raises NotConverged where triangles turned over."""
-    old, new = (
-        np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-        for p in (start.vertices[start.triangles], at[start.triangles])
-    )
+    old, new = area_vectors(start.vertices, start.triangles), area_vectors(at, start.triangles)
     if (np.sum(old * new, axis=1) <= 0.0).any():
         raise NotConverged(
             f"Rounded to {radius:.3g} m the surface folds over",

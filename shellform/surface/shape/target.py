@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 
@@ -19,6 +18,13 @@ from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.compiled import njit
 from shellform.errors import InputError, how_many
 from shellform.surface.shape.jets import jets
+from shellform.surface.shape.triangles import (
+    adjacency,
+    area_vectors,
+    counted_edges,
+    triangle_areas,
+    used_points,
+)
 
 _SAME = 1e-9  # of the size: vertices nearer than that are one
 ON_GROUND = 0.02  # of the rise: an edge within it of the lowest level stands on the ground
@@ -109,7 +115,7 @@ def make_surface(
         )
     _refuse_pieces(points, faces, where)
     faces = _oriented(faces, len(points), where)
-    up = _area_vectors(points, faces).sum(axis=0)
+    up = area_vectors(points, faces).sum(axis=0)
     if up[2] < 0.0:
         faces = faces[:, ::-1].copy()
     rough = rough_normals(points, faces)
@@ -156,19 +162,6 @@ def width(surface: Surface) -> float:
     return surface._width
 
 
-def triangle_areas(points: Reals, triangles: Indices) -> Reals:
-    """The areas (t,), m², of the triangles (t, 3) between the points (v, 3)."""
-    return np.asarray(np.linalg.norm(_area_vectors(points, triangles), axis=1))
-
-
-def vertex_areas(points: Reals, triangles: Indices) -> Reals:
-    """A third (v,), m², of the triangles (t, 3) at each of the points (v, 3)."""
-    area = triangle_areas(points, triangles)
-    result = np.zeros(len(points))
-    np.add.at(result, triangles, (area / 3.0)[:, None])
-    return result
-
-
 def _cleaned(
     points: Reals, faces: Indices, normals: Reals | None
 ) -> tuple[Reals, Indices, Reals | None, list[str]]:
@@ -210,8 +203,7 @@ def _cleaned(
             )
         )
         faces = faces[np.sort(once)]
-    used = np.zeros(len(points), dtype=bool)
-    used[faces.ravel()] = True
+    used, among_used = used_points(faces, len(points))
     if not used.all():
         mended.append(
             how_many(
@@ -220,25 +212,22 @@ def _cleaned(
                 "vertices without triangle were dropped",
             )
         )
-        faces = (np.cumsum(used) - 1)[faces]
-        points = points[used]
+        points, faces = points[used], among_used
         normals = None if normals is None else normals[used]
     return points, faces, normals, mended
 
 
 def _refuse_pieces(points: Reals, faces: Indices, where: str) -> None:
-    edges = np.sort(_directed_edges(faces), axis=1)
-    keys, counts = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_counts=True)
+    edges, counts = counted_edges(faces)
     if (counts > 2).any():
-        a = keys[np.argmax(counts > 2)] // len(points)
+        a = edges[np.argmax(counts > 2), 0]
         raise InputError(
             f"{how_many(int((counts > 2).sum()), 'edge belongs', 'edges belong')} to more than two triangles, the first at "
             f"{points[a].round(4).tolist()}",
             where=where,
             remedy="Remove the faces inside or behind the surface and export it again.",
         )
-    adjacency = _adjacency(faces, len(points))
-    pieces, label = connected_components(adjacency, directed=False)
+    pieces, label = connected_components(adjacency(faces, len(points)), directed=False)
     if pieces > 1:
         sizes = np.sort(np.bincount(label[faces[:, 0]], minlength=pieces))[::-1]
         raise InputError(
@@ -301,8 +290,7 @@ def _turn(faces, across, turned):  # type: ignore[no-untyped-def]
 
 def rough_normals(points: Reals, faces: Indices) -> Reals:
     """Unit vertex normals (v, 3): triangle normals weighted by the angle at the vertex."""
-    corner = points[faces]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    corner, normal = points[faces], area_vectors(points, faces)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     total = np.zeros_like(points)
     for k in range(3):
@@ -323,16 +311,6 @@ def _distinct(rows: Indices) -> tuple[Indices, Indices]:
     kind = np.empty(len(rows), dtype=np.int64)
     kind[order] = np.cumsum(new) - 1
     return order[new], kind
-
-
-def _area_vectors(points: Reals, faces: Indices) -> Reals:
-    corner = points[faces]
-    return np.asarray(0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
-
-
-def _directed_edges(faces: Indices) -> Indices:
-    """Edges (3 t, 2): of all triangles their first, then their second, then their third."""
-    return np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
 
 
 def _length(loop: Reals) -> float:
@@ -366,9 +344,3 @@ def across_edges(faces: Indices, count: int) -> Indices:
     result = np.full(len(key), -1)
     result[first], result[second] = second // 3, first // 3
     return result.reshape(-1, 3)
-
-
-def _adjacency(faces: Indices, count: int) -> sp.csr_array:
-    edges = _directed_edges(faces)
-    graph = sp.csr_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    return sp.csr_array((graph + graph.T) > 0).astype(float)
