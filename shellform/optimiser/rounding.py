@@ -70,8 +70,9 @@ def tried(
     each with its cables optimised.
 
     `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed
-    section; `solver` is what made the optimum. The stiffness that the optimum kept and what was asked of it
-    as built are asked of each. Raises InputError where no section that the net allows is stiff enough.
+    section; `solver` is what made the optimum. The stiffness that the optimum kept, as far as a section has
+    it at all, and what was asked of it as built are asked of each. Raises InputError where no section that
+    the net allows is stiff enough.
     """
     shell = best.problem.shell
     needed = {best.problem.design_load.name, *(share.term.load for share in best.problem.minimise)} - {""}
@@ -157,7 +158,8 @@ def broken(optimum: Optimum) -> str:
 
 
 def _share(problem: Problem, start: Design, least: float) -> float:
-    """`least`, N/m, as a share of the start's softest mode under the design load."""
+    """`least`, N/m, as a share of the start's softest mode under the design load, at the most all of it: rods
+    thinner than the optimum's have less than that kept, and a solver takes shares alone."""
     name = problem.design_load.name
     reached = follow(problem.shell, start, {name: problem.design_load.force}, stay=True)[name]
     softest = (
@@ -165,7 +167,7 @@ def _share(problem: Problem, start: Design, least: float) -> float:
         if reached.on_branch
         else 0.0
     )
-    return float(least / softest) if softest > 0.0 else 0.0
+    return min(float(least / softest), 1.0) if softest > 0.0 else 0.0
 
 
 def _candidate(

@@ -183,9 +183,12 @@ def test_the_paper_s_method_is_used_as_it_is(optimising):
 
 
 @pytest.mark.parametrize(
-    ("softest", "on_branch", "share"), [(8.0, True, 0.25), (-8.0, True, 0.0), (8.0, False, 0.0)]
+    ("softest", "on_branch", "share"),
+    [(8.0, True, 0.25), (-8.0, True, 0.0), (8.0, False, 0.0), (1.5, True, 1.0)],
 )
-def test_stiffness_is_asked_for_as_a_share_of_the_start_s(monkeypatch, softest, on_branch, share):
+def test_stiffness_is_asked_for_as_a_share_of_the_start_s_at_most_all_of_it(
+    monkeypatch, softest, on_branch, share
+):
     problem = SimpleNamespace(
         design_load=SimpleNamespace(name="wet", force="load"),
         shell=SimpleNamespace(network=lambda start: start),
@@ -199,6 +202,7 @@ def test_stiffness_is_asked_for_as_a_share_of_the_start_s(monkeypatch, softest, 
     monkeypatch.setattr(rounding, "assemble", lambda network: network)
     monkeypatch.setattr(rounding, "modes", lambda *_: SimpleNamespace(stiffness=np.array([softest, 99.0])))
     assert rounding._share(problem, "start", 2.0) == share
+    assert sf.SequentialConvex(stiffness=share).stiffness == share
 
 
 def test_sections_beside_the_free_radius_are_tried_each_from_its_own_design_and_from_all_cables(monkeypatch):
