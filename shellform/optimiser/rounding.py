@@ -17,12 +17,13 @@ from shellform.errors import NotConverged
 from shellform.gridshell.catalogue import Catalogue, label, neighbours, rounded_up
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import ROD
+from shellform.optimiser.limits_told import not_kept
 from shellform.optimiser.moving_asymptotes import MovingAsymptotes
 from shellform.optimiser.optimise import optimise
 from shellform.optimiser.optimum import Optimum
 from shellform.optimiser.solver import SequentialConvex
 from shellform.problem.paths import deviations, follow
-from shellform.problem.problem import FEASIBLE, Problem
+from shellform.problem.problem import Problem
 from shellform.problem.terms import LoadedDesign, measured
 from shellform.problem.weights import start_weights
 from shellform.reliability.safety import Safety
@@ -152,9 +153,9 @@ def _optimised(
 def broken(optimum: Optimum) -> str:
     """The limits that the optimum doesn't keep, in words; empty where it keeps all."""
     lost = [name for name in optimum.problem.loads if not optimum.loaded[name].on_branch]
-    over = [f"{name} {value:+.1%}" for name, value in optimum.constraints.items() if value > FEASIBLE]
+    over = not_kept(optimum.constraints)
     said = [f"not stable under {', '.join(lost)}"] if lost else []
-    return "; ".join(said + ([f"over its limit: {', '.join(over)}"] if over else []))
+    return "; ".join(said + ([f"beyond its limit: {', '.join(over)}"] if over else []))
 
 
 def _share(problem: Problem, start: Design, least: float) -> float:

@@ -45,10 +45,13 @@ def test_what_an_optimum_breaks_is_told_by_name_and_by_how_much():
 
     stable = True
     assert broken(of(misfit=0.0009, cable_force=-0.5)) == ""
-    assert broken(of(misfit=0.021, cable_force=0.0011)) == "over its limit: misfit +2.1%, cable_force +0.1%"
+    over = {"misfit": 0.21, "cable_force": 0.0011, "uplift": 0.3}
+    assert (
+        broken(of(**over)) == "beyond its limit: misfit at 110.0% of it, cable_force at 100.1% of it, uplift"
+    )
     stable = False
     assert broken(of(misfit=-0.1)) == "not stable under wetter"
-    assert broken(of(misfit=0.5)) == "not stable under wetter; over its limit: misfit +50.0%"
+    assert broken(of(misfit=0.5)) == "not stable under wetter; beyond its limit: misfit at 122.5% of it"
 
 
 class Beams:
