@@ -308,7 +308,10 @@ class OptimiseEntry(Entry):
     rest_length_max: float = Field(
         1.1, gt=1.0, lt=100.0, description="bound (3), times the initial rest length"
     )
-    radius_min: PositiveFloat | None = Field(None, description="bound (4), m; left out: half the start's")
+    radius_min: PositiveFloat | None = Field(
+        None,
+        description="bound (4), m; left out: half the start's, with a catalogue as stiff as its softest section that the net allows",
+    )
     misfit_rms_additional: PositiveFloat = Field(
         description="constraint (6) as root mean square distance a node, m; as much as the surface's larger side limits nothing"
     )

@@ -61,6 +61,7 @@ def refusal_words(error: Exception) -> tuple[str, int] | None:
 
 def tell_designs(summary: Summary) -> None:
     """What a designer asks first."""
+    from shellform.optimiser.limits_told import not_kept
     from shellform.quantities import number
 
     for name, design in summary.designs.items():
@@ -73,7 +74,7 @@ def tell_designs(summary: Summary) -> None:
     found = summary.optimisation
     if found is not None:
         print(f"objective {number(found.objective_start)} -> {number(found.objective_end)}: {found.status}")
-        over = [f"{name} by {value:.1%}" for name, value in found.constraints.items() if value > 1e-3]
+        over = not_kept(found.constraints)
         if over:
             print(f"limits that are not kept: {', '.join(over)}")
     for each in summary.sections or ():

@@ -324,6 +324,8 @@ def _tell(search: _Search) -> None:
         arrays[f"{k} rest_length"] = point.design.rest_length
         for name, state in point.states.items():
             arrays |= {f"{k} {name} positions": state.positions, f"{k} {name} quaternions": state.quaternions}
+            if state.tail is not None:
+                arrays[f"{k} {name} tail"] = state.tail
     search.keep(Checkpoint(numbers, arrays, tuple(search.history)))
 
 
@@ -338,7 +340,12 @@ def _resume(search: _Search, checkpoint: Checkpoint) -> None:
     search.near = []
     for k, radius in enumerate(numbers["radii"]):
         states = {
-            name: State(arrays[f"{k} {name} positions"], arrays[f"{k} {name} quaternions"]) for name in used
+            name: State(
+                arrays[f"{k} {name} positions"],
+                arrays[f"{k} {name} quaternions"],
+                arrays.get(f"{k} {name} tail"),
+            )
+            for name in used
         }
         design = Design(arrays[f"{k} rest_length"], present, radius)
         search.near.append(evaluator.linearised(evaluator.seed(design, states, search.stage)))

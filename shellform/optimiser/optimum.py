@@ -130,6 +130,13 @@ def largest(named: Iterable[tuple[str, float]]) -> dict[str, float]:
     return found
 
 
+def by_constraint(steps: Sequence[Step]) -> dict[str, list[float]]:
+    """The constraints of steps by name, nan at those that had none of a name: a search that stops asking for
+    stiffness goes on without that one."""
+    names = dict.fromkeys(name for step in steps for name in step.constraints)
+    return {name: [step.constraints.get(name, np.nan) for step in steps] for name in names}
+
+
 def worse(objective: float, share: float) -> float:
     """What is worse than an objective of either sign by a `share` of its size; better, of a share below 0."""
     return (1.0 + share) * objective if objective >= 0.0 else (1.0 - share) * objective

@@ -17,12 +17,13 @@ from shellform.errors import NotConverged
 from shellform.gridshell.catalogue import Catalogue, label, neighbours, rounded_up
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import ROD
+from shellform.optimiser.limits_told import not_kept
 from shellform.optimiser.moving_asymptotes import MovingAsymptotes
 from shellform.optimiser.optimise import optimise
 from shellform.optimiser.optimum import Optimum
 from shellform.optimiser.solver import SequentialConvex
 from shellform.problem.paths import deviations, follow
-from shellform.problem.problem import FEASIBLE, Problem
+from shellform.problem.problem import Problem
 from shellform.problem.terms import LoadedDesign, measured
 from shellform.problem.weights import start_weights
 from shellform.reliability.safety import Safety
@@ -70,8 +71,9 @@ def tried(
     each with its cables optimised.
 
     `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed
-    section; `solver` is what made the optimum. The stiffness that the optimum kept and what was asked of it
-    as built are asked of each. Raises InputError where no section that the net allows is stiff enough.
+    section; `solver` is what made the optimum. The stiffness that the optimum kept, as far as a section has
+    it at all, and what was asked of it as built are asked of each. Raises InputError where no section that
+    the net allows is stiff enough.
     """
     shell = best.problem.shell
     needed = {best.problem.design_load.name, *(share.term.load for share in best.problem.minimise)} - {""}
@@ -151,13 +153,14 @@ def _optimised(
 def broken(optimum: Optimum) -> str:
     """The limits that the optimum doesn't keep, in words; empty where it keeps all."""
     lost = [name for name in optimum.problem.loads if not optimum.loaded[name].on_branch]
-    over = [f"{name} {value:+.1%}" for name, value in optimum.constraints.items() if value > FEASIBLE]
+    over = not_kept(optimum.constraints)
     said = [f"not stable under {', '.join(lost)}"] if lost else []
-    return "; ".join(said + ([f"over its limit: {', '.join(over)}"] if over else []))
+    return "; ".join(said + ([f"beyond its limit: {', '.join(over)}"] if over else []))
 
 
 def _share(problem: Problem, start: Design, least: float) -> float:
-    """`least`, N/m, as a share of the start's softest mode under the design load."""
+    """`least`, N/m, as a share of the start's softest mode under the design load, at the most all of it: rods
+    thinner than the optimum's have less than that kept, and a solver takes shares alone."""
     name = problem.design_load.name
     reached = follow(problem.shell, start, {name: problem.design_load.force}, stay=True)[name]
     softest = (
@@ -165,7 +168,7 @@ def _share(problem: Problem, start: Design, least: float) -> float:
         if reached.on_branch
         else 0.0
     )
-    return float(least / softest) if softest > 0.0 else 0.0
+    return min(float(least / softest), 1.0) if softest > 0.0 else 0.0
 
 
 def _candidate(

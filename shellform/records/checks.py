@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
+from shellform.optimiser.limits_told import AT_LEAST, share_of_limit
 from shellform.quantities import number
 from shellform.records.as_built import critical_checks, guide_checks, standing_checks
 from shellform.records.check import SLACK, UNASKED, Cell, Check, Subject, below, on_worse_mesh, share_of
@@ -23,8 +24,6 @@ from shellform.records.summary import DesignRecord, LoadRecord, Summary
 from shellform.records.words import constraint_titles, load_title
 
 BUILT = ("optimised", "rounded", "polished")  # in the order in which they are made
-_SQUARED = ("misfit", "built_misfit")  # sums of squares of what users limit as a root mean square
-_AT_LEAST = ("softness", "slackness")  # of which as much is demanded, not at most
 # Unbalanced over largest force: what an equilibrium that counts as found stays below.
 _SETTLED, _SETTLED_TOLD = 1e-6, "unbalanced force up to a millionth of the largest"
 _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or loosen the limit."
@@ -159,7 +158,7 @@ def _of_the_optimiser(
     titles = constraint_titles(record.constraints)
     for name, value in record.constraints.items():
         cell = replace(_constraint(name, value), remedy=_EVALUATIONS)
-        limit = "at least what is demanded" if name.partition(".")[0] in _AT_LEAST else "up to the limit"
+        limit = "at least what is demanded" if name.partition(".")[0] in AT_LEAST else "up to the limit"
         cells = {design: cell if design == "optimised" else UNASKED for design in designs}
         found.append(Check(titles[name], limit, cells, Subject.SEARCH))
     if record.cables_max is not None:
@@ -201,18 +200,14 @@ def _settled(row: LoadRecord) -> Cell:
 
 
 def _constraint(name: str, value: float) -> Cell:
-    """From value / limit - 1 <= 0. Misfits count by their squares, a softness is 1 - (stiffness / least)², a
-    slackness 1 - pull / least, and an uplift is offset, so that its share tells nothing."""
+    """From a residual, at most 0 where the constraint is kept."""
     if not math.isfinite(value):
         return Cell("not known", False)
-    kind, holds = name.partition(".")[0], value <= SLACK
-    if kind in _AT_LEAST:
-        ratio = math.sqrt(max(1.0 - value, 0.0)) if kind == "softness" else 1.0 - value
-        return Cell(f"{ratio:.2f} ×", holds)
-    if kind == "uplift":
+    share, holds = share_of_limit(name, value), value <= SLACK
+    if share is None:
         return Cell("within" if holds else "beyond", holds)
-    share = math.sqrt(max(1.0 + value, 0.0)) if kind in _SQUARED else 1.0 + value
-    return Cell(f"{100.0 * share:.0f} %", holds)
+    at_least = name.partition(".")[0] in AT_LEAST
+    return Cell(f"{share:.2f} ×" if at_least else f"{100.0 * share:.0f} %", holds)
 
 
 def _stressed(value: float, rods: RodsOf) -> Cell:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from shellform.errors import Damaged
-from shellform.optimiser.optimum import Step
+from shellform.optimiser.optimum import Step, by_constraint
 from shellform.records.files import ANEW
 from shellform.tables import Table, table_text
 from shellform.written import write_text
@@ -18,7 +18,7 @@ _TERM, _CONSTRAINT = "term.", "constraint."
 
 def write_history(folder: Path, history: Sequence[Step]) -> None:
     """Writes history.csv into a run folder. Raises InputError where it can't be written."""
-    terms, constraints = list(history[0].terms), list(history[0].constraints)
+    terms, constraints = list(history[0].terms), list(by_constraint(history))
     names = [f"{_TERM}{name}" for name in terms] + [f"{_CONSTRAINT}{name}" for name in constraints]
     heads = ("evaluation", "accepted", "objective", *names, "cables", "stage", "seconds")
     rows = tuple(
@@ -27,7 +27,7 @@ def write_history(folder: Path, history: Sequence[Step]) -> None:
             int(step.accepted),
             step.objective,
             *(step.terms[name] for name in terms),
-            *(step.constraints[name] for name in constraints),
+            *(step.constraints.get(name) for name in constraints),
             step.cables,
             step.stage,
             round(step.seconds, 3),
@@ -62,7 +62,7 @@ def _step(number: int, row: Mapping[str, str]) -> Step:
         evaluation=int(row["evaluation"]),
         objective=float(row["objective"]),
         terms=_group(row, _TERM),
-        constraints=_group(row, _CONSTRAINT),
+        constraints=_group({name: value for name, value in row.items() if value}, _CONSTRAINT),
         cables=int(row["cables"]),
         stage=float(row["stage"]),
         accepted=bool(int(row["accepted"])),

@@ -17,6 +17,7 @@ from shellform.errors import InputError, NotConverged, require_known, require_nu
 from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import rod_forces
+from shellform.optimiser.optimum import by_constraint
 from shellform.records import history
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.words import fallen_at
@@ -242,7 +243,7 @@ def draw_histories(run: Run, *, ending: str = ".png", folder: Path | None = None
         )
     at = [float(step.evaluation) for step in steps]
     terms = {name: [step.terms[name] for step in steps] for name in steps[0].terms}
-    constraints = {name: [step.constraints[name] for step in steps] for name in steps[0].constraints}
+    constraints = by_constraint(steps)
     figures = figures_folder(run, folder)
     files = [figures / f"{name}{ending}" for name in ("objective", "constraints")]
     plots.objective_history(files[0], at, terms, cables=[float(step.cables) for step in steps])

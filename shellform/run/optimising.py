@@ -227,7 +227,9 @@ def _wishes(
         count = int(design.present.sum())
         cables = CableCountRecord(most, count, count <= most)
         if count > most:
-            text = f"{count} cables are left, not {most}: with fewer a limit is broken"
+            text = (
+                f"{count} cables are left, not {most}: no design with fewer was found that keeps every limit"
+            )
             workspace.say("optimise", text, Kind.NOTE)
     if groups is not None:
         numbers, lengths = groups[design.present], design.rest_length[design.present]

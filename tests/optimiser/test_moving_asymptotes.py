@@ -1,7 +1,7 @@
 """The paper's own method: MMA directly in the rest lengths, on a coarse vault and beside a problem of
 Svanberg's."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +13,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser import moving_asymptotes
 from shellform.problem.terms import Measurement, Term
+from shellform.structure.elements.state import extended, moved
 from tests.optimiser.told import loaded
 
 SHARE = np.array([61.0, 37.0, 19.0, 7.0, 1.0])  # of Svanberg's cantilever
@@ -143,6 +144,20 @@ def test_a_direct_search_resumed_anywhere_ends_with_the_same_design_and_history_
             whole.evaluations,
             whole.status,
         )
+
+
+def test_a_direct_search_resumed_with_states_of_twice_the_digits_has_all_of_them(coarse):
+    kept, asked = [], (problem(coarse), coarse.design(), sf.MovingAsymptotes(), 3, None)
+    search = moving_asymptotes._begun(*asked, kept.append)
+    step = np.full((coarse.node_count, 6), 1e-17)
+    states = {name: moved(extended(state), step) for name, state in search.best.states.items()}
+    search.near = [replace(search.best, states=states)]
+    moving_asymptotes._tell(search)
+    again = moving_asymptotes._begun(*asked, None)
+    moving_asymptotes._resume(again, kept[0])
+    for name, state in states.items():
+        assert state.tail.any()
+        np.testing.assert_array_equal(again.best.states[name].tail, state.tail)
 
 
 def test_settings_and_starts_that_can_t_be_are_refused(coarse):

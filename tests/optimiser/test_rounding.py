@@ -45,10 +45,13 @@ def test_what_an_optimum_breaks_is_told_by_name_and_by_how_much():
 
     stable = True
     assert broken(of(misfit=0.0009, cable_force=-0.5)) == ""
-    assert broken(of(misfit=0.021, cable_force=0.0011)) == "over its limit: misfit +2.1%, cable_force +0.1%"
+    over = {"misfit": 0.21, "cable_force": 0.0011, "uplift": 0.3}
+    assert (
+        broken(of(**over)) == "beyond its limit: misfit at 110.0% of it, cable_force at 100.1% of it, uplift"
+    )
     stable = False
     assert broken(of(misfit=-0.1)) == "not stable under wetter"
-    assert broken(of(misfit=0.5)) == "not stable under wetter; over its limit: misfit +50.0%"
+    assert broken(of(misfit=0.5)) == "not stable under wetter; beyond its limit: misfit at 122.5% of it"
 
 
 class Beams:
@@ -183,9 +186,12 @@ def test_the_paper_s_method_is_used_as_it_is(optimising):
 
 
 @pytest.mark.parametrize(
-    ("softest", "on_branch", "share"), [(8.0, True, 0.25), (-8.0, True, 0.0), (8.0, False, 0.0)]
+    ("softest", "on_branch", "share"),
+    [(8.0, True, 0.25), (-8.0, True, 0.0), (8.0, False, 0.0), (1.5, True, 1.0)],
 )
-def test_stiffness_is_asked_for_as_a_share_of_the_start_s(monkeypatch, softest, on_branch, share):
+def test_stiffness_is_asked_for_as_a_share_of_the_start_s_at_most_all_of_it(
+    monkeypatch, softest, on_branch, share
+):
     problem = SimpleNamespace(
         design_load=SimpleNamespace(name="wet", force="load"),
         shell=SimpleNamespace(network=lambda start: start),
@@ -199,6 +205,7 @@ def test_stiffness_is_asked_for_as_a_share_of_the_start_s(monkeypatch, softest, 
     monkeypatch.setattr(rounding, "assemble", lambda network: network)
     monkeypatch.setattr(rounding, "modes", lambda *_: SimpleNamespace(stiffness=np.array([softest, 99.0])))
     assert rounding._share(problem, "start", 2.0) == share
+    assert sf.SequentialConvex(stiffness=share).stiffness == share
 
 
 def test_sections_beside_the_free_radius_are_tried_each_from_its_own_design_and_from_all_cables(monkeypatch):

@@ -5,10 +5,12 @@ key.
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from shellform.errors import Damaged, InputError
-from shellform.optimiser.optimum import Step
+from shellform.optimiser.optimum import Step, by_constraint
+from shellform.output.page.report import _charts
 from shellform.records.history import read_history, write_history
 from shellform.records.scattering import SampleRecord
 from shellform.records.stages import StagesDone, read_stages, write_stages
@@ -130,6 +132,20 @@ def test_a_history_is_read_back_as_it_was_written(tmp_path):
     write_history(tmp_path, steps)
     assert read_history(tmp_path) == steps
     assert read_history(tmp_path / "nowhere") == ()
+
+
+def test_a_history_whose_search_stops_asking_for_stiffness_is_read_back_and_drawn_with_a_gap(tmp_path):
+    constraints = [{"uplift": 0.1, "softness.half": -0.2}, {"uplift": 0.0}, {"uplift": -0.1}]
+    steps = tuple(
+        Step(k, 0.5, {"misfit": 0.5}, own, 7, 1.0, True, 0.125) for k, own in enumerate(constraints)
+    )
+    write_history(tmp_path, steps)
+    assert read_history(tmp_path) == steps
+    columns = by_constraint(steps)
+    assert list(columns) == ["uplift", "softness.half"]
+    assert columns["uplift"] == [0.1, 0.0, -0.1]
+    assert columns["softness.half"] == pytest.approx([-0.2, np.nan, np.nan], nan_ok=True)
+    assert any(each.title.startswith("Constraints") for each in _charts(steps))
 
 
 @pytest.mark.parametrize(

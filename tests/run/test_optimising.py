@@ -62,7 +62,9 @@ def test_cables_are_counted_that_are_left_and_more_than_were_wished_for_are_told
     desk = Desk(cables_max=most)
     assert optimising._wishes(desk, DESIGN, None) == (CableCountRecord(most, 4, kept), None)
     assert desk.said == (
-        [] if kept else [("4 cables are left, not 3: with fewer a limit is broken", Kind.NOTE)]
+        []
+        if kept
+        else [("4 cables are left, not 3: no design with fewer was found that keeps every limit", Kind.NOTE)]
     )
 
 

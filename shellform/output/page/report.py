@@ -19,7 +19,7 @@ from urllib.parse import quote
 
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import label
-from shellform.optimiser.optimum import Step
+from shellform.optimiser.optimum import Step, by_constraint
 from shellform.output.page import charts
 from shellform.output.page.first_answers import answers
 from shellform.output.page.profile_table import profile_table
@@ -187,8 +187,9 @@ def _charts(history: Sequence[Step]) -> list[charts.Chart]:
     at = [float(step.evaluation) for step in steps]
     terms = {"objective": [step.objective for step in steps]}
     terms |= {name.replace("_", " "): [step.terms[name] for step in steps] for name in steps[0].terms}
-    titles = words.constraint_titles(steps[0].constraints)
-    limits = {title: [step.constraints[name] for step in steps] for name, title in titles.items()}
+    found_of = by_constraint(steps)
+    titles = words.constraint_titles(found_of)
+    limits = {title: found_of[name] for name, title in titles.items()}
     found = [charts.line_chart("Objective and its terms", at, terms)]
     if limits:
         title = "Constraints: beyond the limit, as a share of it (allowed up to 0; cut at −1.5 and 1)"
