@@ -8,6 +8,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.output.workshop import nesting
+from shellform.output.workshop.splice_schedule import cutting_notes
 
 
 def grid_of(*lengths, spacing=1.0):
@@ -93,3 +94,24 @@ def test_two_laths_are_cut_for_each_rod():
     assert found == [[(0, 2.0), (1, 1.5)], [(0, 2.0), (1, 1.5)]]
     assert [bar.offcut for bar in cutting.bars] == [0.0, 0.0], "the saw's last cut ends the bar"
     assert cutting.waste == pytest.approx(0.2 / 7.2)
+
+
+def splices_of(cutting):
+    return sorted(piece.start for bar in cutting.bars for piece in bar.pieces if piece.part > 1)
+
+
+def test_two_laths_of_a_rod_are_never_spliced_in_one_place_where_that_can_be_helped():
+    """From either end a piece of 3.5 m would be the longest that 4 m of stock allow of 7 m."""
+    assert splices_of(nesting.cut(grid_of(7.0), stock=4.0, kerf=0.0)) == [3.5]
+    cutting = nesting.cut(grid_of(7.0), stock=4.0, kerf=0.0, laths=2)
+    assert splices_of(cutting) == [0.5, 3.5, 4.5]
+    assert cutting.spliced_through == ()
+
+
+def test_rods_of_which_both_laths_must_be_spliced_in_one_place_are_told():
+    cutting = nesting.cut(grid_of(3.0, 0.9), stock=1.0, kerf=0.0, laths=2)
+    assert splices_of(cutting) == [0.5, 0.5, 1.5, 1.5, 2.5, 2.5]
+    assert cutting.spliced_through == (0,)
+    assert nesting.cut(grid_of(3.0, 3.0), stock=1.0, kerf=0.0).spliced_through == (), "of one lath each"
+    told = cutting_notes(cutting, ["U0", "V1"])
+    assert told[-1].startswith("Both laths are spliced in one place, where only splices hold the rod: U0. ")

@@ -8,12 +8,14 @@ bar above it.
 
 A rod longer than the stock is spliced from pieces whose ends lie halfway between two crossings, away from the
 joints. Every second such rod is divided from its other end, so that splices of neighbours stand in different
-places.
+places. Of a rod of two laths one is divided from its first end and the other one from its second, never both
+between the same two crossings where that can be helped: only the splices would hold such a rod there.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -70,6 +72,12 @@ class Cutting:
         return tuple(sorted({piece.rod for bar in self.bars for piece in bar.pieces if piece.parts > 1}))
 
     @property
+    def spliced_through(self) -> tuple[int, ...]:
+        """Numbers of the rods of which more than one lath is spliced in the same place."""
+        held = Counter((each.rod, each.start) for bar in self.bars for each in bar.pieces if each.part > 1)
+        return tuple(sorted({rod for (rod, _), laths in held.items() if laths > 1}))
+
+    @property
     def waste(self) -> float:
         """Share of what is bought that is no rod."""
         used = sum(piece.length for bar in self.bars for piece in bar.pieces)
@@ -89,11 +97,16 @@ def cut(grid: Grid, *, stock: float = STOCK, kerf: float = KERF, laths: int = 1)
     require_count(laths, where="laths", give="how many laths each rod is of, such as 2")
     pieces: list[Piece] = []
     spliced = 0
-    for number, rod in [each for each in enumerate(grid.rods) for _ in range(laths)]:
-        cuts = [] if rod.length <= stock + _EQUAL else _splices(rod, stock, backwards=spliced % 2 == 1)
-        spliced += bool(cuts)
-        ends = [0.0, *cuts, rod.length]
-        pieces += [Piece(number, k + 1, len(ends) - 1, a, b - a) for k, (a, b) in enumerate(pairwise(ends))]
+    for number, rod in enumerate(grid.rods):
+        taken: list[float] = []
+        for _ in range(laths):
+            cuts = [] if rod.length <= stock + _EQUAL else _splices(rod, stock, spliced % 2 == 1, taken)
+            spliced += bool(cuts)
+            taken += cuts
+            ends = [0.0, *cuts, rod.length]
+            pieces += [
+                Piece(number, k + 1, len(ends) - 1, a, b - a) for k, (a, b) in enumerate(pairwise(ends))
+            ]
     needed = {k: piece.length + kerf for k, piece in enumerate(pieces)}
     room = stock + kerf + 2.0 * _EQUAL
     least = _least([*needed.values()], room)
@@ -108,27 +121,28 @@ def cut(grid: Grid, *, stock: float = STOCK, kerf: float = KERF, laths: int = 1)
     return Cutting(stock, kerf, tuple(bars), least)
 
 
-def _splices(rod: GridRod, stock: float, *, backwards: bool) -> list[float]:
-    """Where the rod is divided, m from its first end, rising: each piece as long as the stock and the
-    crossings allow.
+def _splices(rod: GridRod, stock: float, backwards: bool, taken: Sequence[float]) -> list[float]:
+    """Where a lath of the rod is divided, m from its first end, rising: each piece as long as the stock and
+    the crossings allow, beside the places that are `taken` by its other laths where there are others.
     """
-    places = 0.5 * (rod.marks[:-1] + rod.marks[1:])
-    if backwards:
-        places = rod.length - places[::-1]
+    middles = 0.5 * (rod.marks[:-1] + rod.marks[1:])
+    way = rod.length - middles if backwards else middles
     found: list[float] = []
     begin = 0.0
     while rod.length - begin > stock + _EQUAL:
-        reached = places[(places > begin + _EQUAL) & (places <= begin + stock + _EQUAL)]
-        if not len(reached):
+        reached = (way > begin + _EQUAL) & (way <= begin + stock + _EQUAL)
+        if not reached.any():
             raise InputError(
                 f"a rod of {rod.length:.3g} m can't be spliced from it halfway between its crossings",
                 where="rod.stock_length",
                 value=stock,
                 remedy="Choose a longer stock length.",
             )
-        begin = float(reached[-1])
-        found.append(begin)
-    return [rod.length - place for place in found[::-1]] if backwards else found
+        free = reached & ~np.isin(middles, taken)
+        farthest = int(np.argmax(np.where(free if free.any() else reached, way, 0.0)))
+        begin = float(way[farthest])
+        found.append(float(middles[farthest]))
+    return sorted(found)
 
 
 def _fullest(needed: Mapping[int, float], room: float) -> list[list[int]]:

@@ -30,6 +30,11 @@ def cutting_notes(cutting: Cutting, names: list[str]) -> tuple[str, ...]:
             "a splice for as stiff and as "
             f"strong as the rod: {which}."
         )
+    if cutting.spliced_through:
+        which = ", ".join(names[rod] for rod in cutting.spliced_through)
+        said.append(
+            f"Both laths are spliced in one place, where only splices hold the rod: {which}. Longer stock leaves room to part them."
+        )
     return tuple(said)
 
 
