@@ -36,6 +36,33 @@ def test_a_snap_through_is_told():
     assert before.warnings == ()
 
 
+@pytest.mark.parametrize("held", [(0, 2), (0, 1, 2)])
+def test_under_no_load_at_all_a_structure_is_where_it_is(held):
+    """The factor 0, and supports alone that move, ended in ZeroDivisionError and IndexError."""
+    network = chain(line(2), (1e4, 1.0, 0.2, 0.2), dict.fromkeys(held, CLAMP))
+    model = Model(network, {"down": load_at(network, 1, [0.0, 0.0, -5.0])}, None, held)
+    found = analyse(model, factor=0.0)
+    assert (found.converged, found.equilibrium.stable, found.on_branch) == (True, True, True)
+    np.testing.assert_array_equal(found.equilibrium.state.positions, network.nodes)
+
+
+def test_supports_move_where_no_node_is_free():
+    network = chain(line(1), (1e4, 1.0, 0.2, 0.2), {0: CLAMP, 1: CLAMP})
+    moved = replace(network, imposed=np.array([[0.0] * 6, [0.01, 0.0, 0.0, 0.0, 0.0, 0.0]]))
+    found = analyse(Model(moved, {}, None, (0, 1)))
+    assert found.converged
+    assert found.reactions[1, 0] == pytest.approx(100.0)
+
+
+def test_a_rod_too_long_for_its_supports_is_solved_without_a_load():
+    """It was refused, since nothing moves under a load that isn't there."""
+    network = in_plane(chain(line(8), (1e4, 1.0, 0.2, 0.2), {0: PIN, 8: PIN}))
+    beams = replace(network.beams, rest_length=1.01 * network.beams.rest_length)
+    straight = analyse(Model(replace(network, beams=beams), {}, None, (0, 8)))
+    assert (straight.converged, straight.equilibrium.stable) == (True, False)
+    assert straight.equilibrium.negative > 0
+
+
 def shallow_truss(elements=1):
     """Von Mises' truss: half span 1 m, rise 0.1 m, EA = 1 kN; it bears 0.38109 N."""
     points = polyline([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.1], [1.0, 0.0, 0.0]], elements)

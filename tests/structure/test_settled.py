@@ -57,7 +57,7 @@ def part(monkeypatch):
     monkeypatch.setattr(BranchPart, "ended", lambda self, *_, **__: self)
     asked.seen = []
     asked.settled = lambda: settle(
-        "assembly",
+        SimpleNamespace(free=np.arange(6)),
         "start",
         DRIVE,
         begin=1.0,

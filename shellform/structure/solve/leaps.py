@@ -51,7 +51,7 @@ class Watch:
     def passes_over(self, before: State, after: State, factor: float, change: float) -> bool:
         """Whether the increment may have passed over what its ends foretell."""
         share = abs(change) / self.most
-        if share <= WINDOW or not len(self.assembly.free):
+        if share <= WINDOW:
             return False
         ends = self._ends(before, after, factor, change)
         return ends is not None and _outlook(fit_for(self.assembly, after), after).passes_over(
@@ -107,7 +107,9 @@ def at_rest(assembly: Assembly, state: State, load: Reals) -> bool:
 
 def _motion(assembly: Assembly, state: State, drive: Drive) -> tuple[Reals, Factor, Reals] | None:
     """The tangent's lower values, its factor, and how all nodes move (n, 6) with the load factor by it, m and
-    rad; None where it isn't positive definite."""
+    rad; None where it isn't positive definite, and where no node is free."""
+    if not len(assembly.free):
+        return None
     own = fit_for(assembly, state)
     grows = drive.load - assembly.force_along(state, drive.imposed) if drive.moves_supports else drive.load
     motion, balance = drive.imposed.ravel().copy(), own.evaluate(state)

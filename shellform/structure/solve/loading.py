@@ -183,6 +183,7 @@ def follow_branch(
     share, spent, good = 0.0, 0, 0
     state, last = start, None
     width = widest = 1.0 / max(1, round(1.0 / step))
+    heeding &= begin != end  # else there is nothing to pass over
     watch = Watch(assembly, drive, max(abs(begin), abs(end)), limit) if heeding else None
     while share < 1.0:
         goal = 1.0 if share + width > 1.0 - 1e-12 else share + width

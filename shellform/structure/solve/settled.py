@@ -66,6 +66,8 @@ def _along_path(
     if not at_rest(assembly, way.state, base):
         return way
     rest, passed, spent = Drive(change * drive.load, change * drive.imposed, base), [], 0
+    if not (rest.moves_supports or rest.load.ravel()[assembly.free].any()):
+        return way  # without a load there is no path
     first = min(FIRST, SMALLEST / (1.0 - share))
     try:
         for point in follow(
