@@ -17,7 +17,7 @@ from shellform.case.beside_surface import refuse_beside
 from shellform.case.build_net import net_record, refuse_distant, size_text, surface_of, surface_record
 from shellform.case.build_rod import rod_material
 from shellform.case.case import SurfaceEntry, load_case
-from shellform.case.entries import Entry
+from shellform.case.entries import Entry, NetEntry
 from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError, require_file
 from shellform.gridshell.joints import usual_gap
@@ -92,15 +92,21 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
     bent = largest_curvature(surface)
     material = rod_material(case.rod) if case else None
     young, strength = (material.young, material.strength) if material else (YOUNG, STRENGTH)
-    cells = 0.0 if case is None else surface.area / case.net.spacing**2
     return FirstLook(
         surface=surface_record(surface, str(path)),
         format="builder script" if path.suffix == ".py" else FORMATS[kind_of(path)],
         unit=_unit(path, entry.unit),
         curvature_max=bent,
         rod_radius_max=largest_radius(young, strength, bent),
-        expected=None if case is None else Expected(case.net.spacing, round(cells), round(48 * cells)),
+        expected=None if case is None else expected(surface, case.net),
     )
+
+
+def expected(surface: Surface, net: NetEntry) -> Expected:
+    """What to expect of the net on a surface. At each crossing two rods have as many nodes as elements in a
+    segment, of six freedoms each; those at the rods' ends come to it."""
+    cells = surface.area / (net.spacing * (net.spacing_v or net.spacing))
+    return Expected(net.spacing, round(cells), round(2 * 6 * net.elements * cells))
 
 
 def largest_radius(young: float, strength: float, curvature: float) -> float | None:
