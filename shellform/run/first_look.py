@@ -56,7 +56,8 @@ class Expected:
 @dataclass(frozen=True)
 class FirstLook:
     """What a surface is: its record, the file's `format` and `unit`, its largest curvature, 1/m, and the
-    largest radius, m, of rods on it by equation (1) (None: any); of a case what to expect of its net."""
+    largest radius, m, of rods bent to that by equation (1) (None: any), from which the net's may
+    differ either way; of a case what to expect of its net."""
 
     surface: SurfaceRecord
     format: str
@@ -131,13 +132,15 @@ def labelled(found: FirstLook) -> dict[str, str]:
         **{f"mended {k}": text for k, text in enumerate(surface.mended[1:], 2)},
         "largest curvature": f"{number(bent)} 1/m, radius {number(1.0 / bent)} m" if bent > 0.0 else "none",
     }
-    source = "in GFRP, strength/E = 255 MPa/40 GPa"
+    source = "in GFRP, strength/E = 255 MPa/40 GPa, at the surface's largest curvature"
     if found.expected is not None:
         lines["crossings to expect"] = f"about {found.expected.crossings} at {found.expected.spacing:g} m"
         lines["freedoms to expect"] = f"about {found.expected.freedoms}"
         source = "equation 1, at the surface's largest curvature"
     largest = found.rod_radius_max
-    lines["largest rod radius"] = "any" if largest is None else f"at least {number(largest)} m ({source})"
+    lines["largest rod radius"] = (
+        "any" if largest is None else f"about {number(largest)} m ({source}; the net decides)"
+    )
     return lines
 
 
