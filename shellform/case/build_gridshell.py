@@ -26,11 +26,20 @@ from shellform.errors import InputError
 from shellform.gridshell import loads
 from shellform.gridshell.catalogue import Catalogue, largest, named, radius_bounds, read_catalogue
 from shellform.gridshell.edge_beams import Bundle, EdgeBeam, weight
-from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace, max_radius
+from shellform.gridshell.gridshell import (
+    Cable,
+    Gridshell,
+    Joint,
+    Rod,
+    TooCurved,
+    brace,
+    erection_stress,
+    max_radius,
+)
 from shellform.gridshell.layers import single
 from shellform.gridshell.loads import Region
 from shellform.net.net import Net
-from shellform.structure.elements.sections import Material, Round, section_area
+from shellform.structure.elements.sections import Material, Round, Section, section_area
 from shellform.surface.shape.target import Surface
 
 
@@ -94,8 +103,10 @@ def rod_of(entry: OwnRodEntry | StockRodEntry, net: Net) -> Rod:
 
 @dataclass(frozen=True)
 class RodLimits:
-    """What a net allows of rods: the farthest that the outermost fibre may lie from a rod's axis
-    (`radius_max`, m), the curvature that the rods bear, 1/m, and the net's largest over it."""
+    """What a net allows of rods: the farthest that the outermost fibre may lie from a round rod's axis
+    (`radius_max`, m), the curvature that the case's rods bear, 1/m, bent as the net bends them (laths across
+    the surface and in it), and the net's largest over it, which is the share of their strength that bending
+    takes."""
 
     radius_max: float
     curvature_limit: float
@@ -106,8 +117,25 @@ def rod_limits(entry: OwnRodEntry | StockRodEntry, net: Net) -> RodLimits:
     """What the net allows of the case's rods."""
     material, section = rod_material(entry), given_section(entry)
     most = net.max_radius(young=material.young, strength=material.strength)
-    limit = material.strength / (material.young * (most if section is None else max(section.fibres)))
-    return RodLimits(most, limit, net.quality.curvature_max / limit if limit > 0.0 else 0.0)
+    if not math.isfinite(most):  # straight
+        bearable = 0.0 if section is None else material.strength / (material.young * max(section.fibres))
+        return RodLimits(most, bearable, 0.0)
+    used = _bent_to(entry, net, section)
+    return RodLimits(most, net.quality.curvature_max / used, used)
+
+
+def _bent_to(entry: OwnRodEntry | StockRodEntry, net: Net, section: Section | None) -> float:
+    """The share of their strength to which the case's rods are bent in the net: those of a catalogue, where
+    no section is named, as they are chosen, or the one that is bent to the least where all break."""
+    if section is not None:
+        return erection_stress(net, section) / section.material.strength
+    if not isinstance(entry, StockRodEntry):
+        return 1.0  # the largest that the net allows
+    try:
+        chosen = largest(stock(entry, entry.catalogue), net)
+    except TooCurved as error:
+        return error.radius * net.quality.curvature_max
+    return erection_stress(net, chosen) / chosen.material.strength
 
 
 def rod_bounds(case: Case, shell: Gridshell) -> tuple[float, float]:

@@ -54,9 +54,9 @@ class EdgeRecord:
 class NetRecord(NetNumbers):
     """The net: how many `crossings`, `rods` and `supports`, at a `spacing` and one along rods v, `spacing_v`,
     m; what was left out of it (`notes`, a sentence each); `rod_radius_max`, m, the farthest that a rod's
-    outermost fibre may lie from its axis; `curvature_limit`, 1/m, that the rods bear, and
-    `curvature_utilisation`, how much of it the net uses; its `angle`, rad, and `offset`, in spacings, on the
-    surface; and its `edges`."""
+    outermost fibre may lie from its axis; `curvature_limit`, 1/m, that the rods bear as the net bends them,
+    and `curvature_utilisation`, how much of it the net uses; its `angle`, rad, and `offset`, in spacings, on
+    the surface; and its `edges`."""
 
     spacing: float
     crossings: int

@@ -17,7 +17,7 @@ from shellform.case.beside_surface import refuse_beside
 from shellform.case.build_net import net_record, refuse_distant, size_text, surface_of, surface_record
 from shellform.case.build_rod import rod_material
 from shellform.case.case import SurfaceEntry, load_case
-from shellform.case.entries import Entry
+from shellform.case.entries import Entry, NetEntry
 from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError, require_file
 from shellform.gridshell.joints import usual_gap
@@ -56,7 +56,8 @@ class Expected:
 @dataclass(frozen=True)
 class FirstLook:
     """What a surface is: its record, the file's `format` and `unit`, its largest curvature, 1/m, and the
-    largest radius, m, of rods on it by equation (1) (None: any); of a case what to expect of its net."""
+    largest radius, m, of rods bent to that by equation (1) (None: any), from which the net's may
+    differ either way; of a case what to expect of its net."""
 
     surface: SurfaceRecord
     format: str
@@ -92,15 +93,21 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
     bent = largest_curvature(surface)
     material = rod_material(case.rod) if case else None
     young, strength = (material.young, material.strength) if material else (YOUNG, STRENGTH)
-    cells = 0.0 if case is None else surface.area / case.net.spacing**2
     return FirstLook(
         surface=surface_record(surface, str(path)),
         format="builder script" if path.suffix == ".py" else FORMATS[kind_of(path)],
         unit=_unit(path, entry.unit),
         curvature_max=bent,
         rod_radius_max=largest_radius(young, strength, bent),
-        expected=None if case is None else Expected(case.net.spacing, round(cells), round(48 * cells)),
+        expected=None if case is None else expected(surface, case.net),
     )
+
+
+def expected(surface: Surface, net: NetEntry) -> Expected:
+    """What to expect of the net on a surface. At each crossing two rods have as many nodes as elements in a
+    segment, of six freedoms each; those at the rods' ends come to it."""
+    cells = surface.area / (net.spacing * (net.spacing_v or net.spacing))
+    return Expected(net.spacing, round(cells), round(2 * 6 * net.elements * cells))
 
 
 def largest_radius(young: float, strength: float, curvature: float) -> float | None:
@@ -125,13 +132,15 @@ def labelled(found: FirstLook) -> dict[str, str]:
         **{f"mended {k}": text for k, text in enumerate(surface.mended[1:], 2)},
         "largest curvature": f"{number(bent)} 1/m, radius {number(1.0 / bent)} m" if bent > 0.0 else "none",
     }
-    source = "in GFRP, strength/E = 255 MPa/40 GPa"
+    source = "in GFRP, strength/E = 255 MPa/40 GPa, at the surface's largest curvature"
     if found.expected is not None:
         lines["crossings to expect"] = f"about {found.expected.crossings} at {found.expected.spacing:g} m"
         lines["freedoms to expect"] = f"about {found.expected.freedoms}"
         source = "equation 1, at the surface's largest curvature"
     largest = found.rod_radius_max
-    lines["largest rod radius"] = "any" if largest is None else f"at least {number(largest)} m ({source})"
+    lines["largest rod radius"] = (
+        "any" if largest is None else f"about {number(largest)} m ({source}; the net decides)"
+    )
     return lines
 
 

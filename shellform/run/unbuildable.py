@@ -183,7 +183,10 @@ def refuse_size(surface: Surface) -> None:
     own = states_unit(Path(surface.source))  # which --unit doesn't change
     remedy = "Scale the file to the size that is meant."
     if taken and not own:
-        remedy = f"Give the file's unit: --unit {taken[0]} makes it {number(side * METRES[taken[0]])} m."
+        possible = [each for each in _SUSPECTED if SMALLEST <= side * METRES[each] <= LARGEST]
+        units = dict.fromkeys([taken[0], *possible])
+        made = [f"{number(side * METRES[each])} m with --unit {each}" for each in units]
+        remedy = f"Give the file's unit, which makes it {', '.join(made)}."
     elif taken or stated:
         said, meant = ("m", taken[0]) if taken else (stated[0], "m")
         how = "in the program that wrote the file, and export it anew" if own else f"by --unit {meant}"

@@ -18,9 +18,10 @@ from shellform.case.entries import (
     PointsEntry,
     RodsWeightEntry,
     SheetEntry,
+    StockRodEntry,
 )
 from shellform.errors import InputError
-from shellform.gridshell.gridshell import Rod
+from shellform.gridshell.gridshell import Rod, max_radius
 from shellform.gridshell.loads import CONCRETE
 from shellform.structure.elements.sections import Rectangle
 
@@ -30,7 +31,7 @@ ROD = {"young": 40e9, "strength": 240e6}
 def net(most=0.02, curvature=0.3):
     return SimpleNamespace(
         max_radius=lambda *, young, strength: most * strength / 240e6 * 40e9 / young,
-        quality=SimpleNamespace(curvature_max=curvature),
+        quality=SimpleNamespace(curvature_max=curvature, curvature=np.array([[[curvature, 0.0]] * 2])),
         edges=(),
     )
 
@@ -46,7 +47,7 @@ def test_rods_without_a_size_are_the_largest_that_the_net_allows_and_a_straight_
     ("sizes", "limit", "share"),
     [
         ({"radius": 0.01}, 0.6, 0.5),  # σ / (E c) = 0.006 / 0.01
-        ({"width": 0.08, "height": 0.02}, 0.15, 2.0),  # by the larger of both fibres
+        ({"width": 0.08, "height": 0.02}, 0.6, 0.5),  # bent across the surface: by the height
         ({}, 0.3, 1.0),  # the largest that the net allows
     ],
 )
@@ -57,7 +58,32 @@ def test_what_a_net_allows_of_rods_is_the_curvature_at_which_their_outermost_fib
     assert found.radius_max == 0.02
     assert found.curvature_limit == pytest.approx(limit)
     assert found.curvature_utilisation == pytest.approx(share)
-    assert rod_limits(OwnRodEntry(**ROD), net(math.inf)).curvature_utilisation == 0.0
+    assert rod_limits(OwnRodEntry(**ROD), net(math.inf, 0.0)).curvature_utilisation == 0.0
+    straight = rod_limits(OwnRodEntry(**ROD, radius=0.01), net(math.inf, 0.0))
+    assert (straight.curvature_limit, straight.curvature_utilisation) == (pytest.approx(0.6), 0.0)
+
+
+def test_a_lath_s_curvature_is_told_beyond_what_it_bears_just_where_it_is_refused():
+    bent = net()
+    bent.quality.curvature = np.array([[[0.24, -0.18], [-0.2, 0.05]]])  # 0.3 1/m together
+    for height, used in [(0.02, 0.7), (0.06, 1.5)]:  # (0.24 h / 2 + 0.18 b / 2) E / f
+        entry = OwnRodEntry(**ROD, width=0.02, height=height)
+        found, rod = rod_limits(entry, bent), rod_of(entry, bent)
+        assert found.curvature_utilisation == pytest.approx(used)
+        assert found.curvature_utilisation == pytest.approx(rod.radius / max_radius(bent, rod))
+        assert found.curvature_limit == pytest.approx(0.3 / used)
+
+
+def test_rods_of_a_catalogue_are_told_as_they_are_chosen_of_it():
+    bent = net(
+        242e6 / (40e9 * 0.3)
+    )  # 20.125 mm of what the catalogue's rods are made of, ⌀ 40 mm is the next below
+    assert rod_of(StockRodEntry(catalogue="gfrp_rods"), bent).radius == 0.02
+    found = rod_limits(StockRodEntry(catalogue="gfrp_rods"), bent)
+    assert found.curvature_utilisation == pytest.approx(40e9 * 0.02 * 0.3 / (0.35 * 690e6))
+    sharp = net(0.001, 6.0)  # laths of 10 × 5 mm, bent across, are bent to the least, and break
+    found = rod_limits(StockRodEntry(catalogue="timber_laths"), sharp)
+    assert found.curvature_utilisation == pytest.approx(12e9 * 0.0025 * 6.0 / 24e6)
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,18 @@ def test_a_size_that_no_shell_has_is_refused_with_the_first_unit_that_makes_a_bu
     if unit is None:
         assert told.value.remedy == "Scale the file to the size that is meant."
     else:
-        assert told.value.remedy == f"Give the file's unit: --unit {unit} makes it {metres} m."
+        first = f"Give the file's unit, which makes it {metres} m with --unit {unit}"
+        assert re.match(first + "[,.]", told.value.remedy)
+
+
+def test_of_a_model_in_millimetres_its_own_unit_is_named_beside_that_which_makes_a_building_of_it():
+    with pytest.raises(InputError, match="which no gridshell is") as told:
+        refuse_size(of_size(900.0, 600.0, 210.0))
+    made = "9 m with --unit cm, 0.9 m with --unit mm, 22.9 m with --unit in"
+    assert told.value.remedy == f"Give the file's unit, which makes it {made}."
+    with pytest.raises(InputError, match="which no gridshell is") as told:
+        refuse_size(of_size(75000.0, 1.0, 1.0))
+    assert told.value.remedy == "Give the file's unit, which makes it 75 m with --unit mm."
 
 
 @pytest.mark.parametrize(("side", "unit", "metres"), [(0.01, "mm", "10"), (0.199, "cm", "19.9")])
