@@ -183,7 +183,8 @@ def follow_branch(
     share, spent, good = 0.0, 0, 0
     state, last = start, None
     width = widest = 1.0 / max(1, round(1.0 / step))
-    watch = Watch(assembly, drive, max(abs(begin), abs(end)), limit) if heeding else None
+    grows = begin != end  # at a factor of 0 nothing does, so that nothing is passed over
+    watch = Watch(assembly, drive, max(abs(begin), abs(end)), limit) if heeding and grows else None
     while share < 1.0:
         goal = 1.0 if share + width > 1.0 - 1e-12 else share + width
         factor, change, least = begin + goal * (end - begin), (goal - share) * (end - begin), smallest

@@ -45,7 +45,7 @@ def settle(
         limit=limit,
         report=report,
     )
-    if way.share < 1.0:
+    if way.share < 1.0 and begin != end:  # where nothing grows no path leads on
         way = _along_path(assembly, way, drive, begin, end, tolerance, report)
     return way.ended(assembly, drive, begin, end, tolerance, stay=stay, limit=limit, report=report)
 
