@@ -53,6 +53,7 @@ def analyse(
     from shellform.structure.model import read_model
     from shellform.structure.solve.memory import limited_to_free_memory
 
+    _refuse_overwriting(output, model, sections)
     report = Spinner()
     try:
         known = read_sections(sections) if sections is not None else None
@@ -91,6 +92,18 @@ def analyse(
             print(file, file=sys.stderr)
     if not analysis.converged:
         raise NotConverged(analysis.message)
+
+
+def _refuse_overwriting(output: Path | None, *read: Path | None) -> None:
+    """Raises InputError for a result that would take the place of what is `read`, or of a folder."""
+    if output is None:
+        return
+    if output.is_dir():
+        raise InputError("is a folder, no file", where=str(output), remedy="Name a file in it.")
+    if output.exists() and any(each is not None and each.exists() and output.samefile(each) for each in read):
+        raise InputError(
+            "is read and would be overwritten", where=str(output), remedy="Choose another --output."
+        )
 
 
 def _lead(text: str) -> tuple[int, int, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -25,4 +26,4 @@ def example(
     place = folder or Path(name)
     for file in lay_example(name, place):
         print(file)
-    print(f"Next:\n  cd {place}\n  {EXAMPLES[name].command}")
+    print(f"Next:\n  cd {shlex.quote(str(place))}\n  {EXAMPLES[name].command}")

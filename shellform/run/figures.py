@@ -18,6 +18,7 @@ from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import rod_forces
 from shellform.optimiser.optimum import by_constraint
+from shellform.output.pictures.panel import Look, Paper
 from shellform.records import history
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.words import fallen_at
@@ -33,20 +34,6 @@ FILMS = ("pour", "erection")
 _STILL = ("spring", "mode", "history")  # of one state, or of none
 _FILMED = "Give --film erection, or leave it out."
 _USUAL = (1600, 1000)  # pixels
-
-
-@dataclass(frozen=True)
-class Paper:
-    """A picture in print: its `width`, m, pixels an inch `dots`, and height of the letters, points."""
-
-    width: float
-    dots: float = 300.0
-    letters: float = 9.0  # the smallest capitals are then 2 mm high
-
-    def size(self, shape: tuple[int, int]) -> tuple[int, int]:
-        """Pixels of a picture with the proportions of `shape`."""
-        across = round(self.width / 0.0254 * self.dots)
-        return across, round(across * shape[1] / shape[0])
 
 
 @dataclass(frozen=True)
@@ -101,6 +88,8 @@ def wish(
     InputError for bad options.
     """
     paper = _paper(width_mm, dpi, font_size, film)
+    if limit is not None:
+        require_number(limit, above=0.0, where="--limit", give="SI units, such as 0.010 for 10 mm")
     if force_limit is not None:
         require_number(force_limit, above=0.0, where="--force-limit", give="newtons, such as 20")
     if film is not None:
@@ -229,7 +218,9 @@ def draw_failure(run: Run) -> list[Path]:
     return [file]
 
 
-def draw_histories(run: Run, *, ending: str = ".png", folder: Path | None = None) -> list[Path]:
+def draw_histories(
+    run: Run, *, ending: str = ".png", folder: Path | None = None, look: Look | None = None
+) -> list[Path]:
     """The objective with its terms and cables, and the constraints, at each accepted design; .png, .svg or
     .pdf."""
     from shellform.output.pictures import plots
@@ -246,8 +237,8 @@ def draw_histories(run: Run, *, ending: str = ".png", folder: Path | None = None
     constraints = by_constraint(steps)
     figures = figures_folder(run, folder)
     files = [figures / f"{name}{ending}" for name in ("objective", "constraints")]
-    plots.objective_history(files[0], at, terms, cables=[float(step.cables) for step in steps])
-    plots.constraint_history(files[1], at, constraints)
+    plots.objective_history(files[0], at, terms, cables=[float(step.cables) for step in steps], look=look)
+    plots.constraint_history(files[1], at, constraints, look=look)
     return files
 
 
@@ -272,21 +263,26 @@ def draw_run(folder: str | Path, wish: Wish | None = None) -> list[Path]:
 
 def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard) -> list[Path]:
     """As `draw_run`, of a run that is read already."""
-    from shellform.output.pictures import net_maps, render
-    from shellform.output.pictures.panel import Look
+    from shellform.output.pictures import net_maps, plots, render
 
     asked = wish or Wish()
     figures = figures_folder(run, asked.folder)
     if asked.quantity == "history":
-        return draw_histories(run, ending=asked.endings[0], folder=asked.folder)
+        look = replace(plots.HISTORY, size=asked.size or plots.HISTORY.size, transparent=asked.transparent)
+        look = asked.paper.look(look) if asked.paper else look
+        return draw_histories(run, ending=asked.endings[0], folder=asked.folder, look=look)
     if asked.quantity == "spring":  # what the springs still pull is the net's, whatever the design
+        panel = net_maps.panel_of(run.net, "springs")
         look = Look(
+            limit=asked.limit or net_maps.limit_of(panel),
             size=asked.size or _USUAL,
             view=asked.view,
             thickness=asked.thickness,
             transparent=asked.transparent,
         )
-        return [net_maps.draw_map(run.net, "springs", figures / f"net-springs{asked.endings[0]}", look=look)]
+        file = figures / f"net-springs{asked.endings[0]}"
+        render.picture(file, panel, asked.paper.look(look) if asked.paper else look)
+        return [file]
     names, loads = chosen(run, asked.design, asked.load)
     report(Event("figures", f"{asked.quantity} of {', '.join(names)}"))
     rows = [[panel_of(run, name, each, asked.quantity) for each in loads] for name in names]
@@ -342,7 +338,7 @@ def titled(run: Run, panel: Any) -> Any:
 
 def look_of(run: Run, wish: Wish, panels: Sequence[Any]) -> Any:
     """How the run's panels are drawn: one scale of colours and of forces for all."""
-    from shellform.output.pictures.panel import Look, Skin
+    from shellform.output.pictures.panel import Skin
 
     largest = max(max(float(panel.deviation.max()) for panel in panels), 1e-9 * panels[0].unit[1])
     rod = run.shell.rod
@@ -359,10 +355,7 @@ def look_of(run: Run, wish: Wish, panels: Sequence[Any]) -> Any:
         surface=Skin(run.surface.vertices, run.surface.triangles),
         transparent=wish.transparent,
     )
-    paper = wish.paper
-    if paper is None:
-        return look
-    return replace(look, size=paper.size(look.size), dots=paper.dots, letters=paper.letters)
+    return wish.paper.look(look) if wish.paper else look
 
 
 def write_states(

@@ -77,6 +77,25 @@ def test_bad_models_are_refused_by_field_and_element(tmp_path, changes, words):
     refused(shellform("analyse", model_file(tmp_path, **changes), "--load", "tip"), *words)
 
 
+def test_a_result_takes_the_place_of_no_file_that_it_was_computed_from(tmp_path):
+    model = model_file(tmp_path)
+    sections = tmp_path / "rods.toml"
+    sections.write_text("[rod]\n", encoding="utf-8")
+    before = model.read_bytes()
+    (tmp_path / "link.json").symlink_to(model)
+    for output in (model, tmp_path / "link.json", sections):
+        ended = shellform("analyse", model, "--load", "tip", "--sections", sections, "--output", output)
+        refused(ended, "would be overwritten", output.name)
+    refused(shellform("analyse", model, "--load", "tip", "--output", tmp_path), "is a folder")
+    assert model.read_bytes() == before
+
+
+def test_the_way_to_an_example_is_told_as_a_shell_takes_it(tmp_path):
+    place = tmp_path / "my vault"
+    told = shellform("example", "model", place).stdout
+    assert f"\n  cd '{place}'\n" in told
+
+
 def test_analyse_asks_for_the_case_where_there_are_several(tmp_path):
     refused(shellform("analyse", model_file(tmp_path)), "several load cases", "tip, side")
     refused(shellform("analyse", model_file(tmp_path), "--load", "top"), "no such load case")

@@ -29,6 +29,7 @@ from scripts import documentation
 from shellform import lazy
 from shellform.case.case import Case
 from shellform.cli.program import app
+from shellform.reliability.probability import counted
 from tests.documentation.stand_ins import StandIns
 
 ROOT = Path(__file__).parent.parent.parent
@@ -242,6 +243,40 @@ def test_every_key_of_a_summary_is_named_where_its_record_is_described():
     assert "## designs.NAME.loads.NAME.stands\n" in page
     for place in re.findall(r"\(#([\w-]+)\)", page):
         assert place in anchors(page)
+
+
+def cited(text):
+    """The numbers of the equations that a text cites: as "equation 8", "equations 9 to 11", "(12)"."""
+    found = set()
+    for first, last in re.findall(r"(?:[Ee]quations? \(?|\()(\d{1,2})\)?(?: to \(?(\d{1,2}))?", text):
+        found |= set(range(int(first), int(last or first) + 1))
+    return found
+
+
+def test_the_code_that_theory_names_for_equations_and_tables_cites_them():
+    rows = re.findall(
+        r"^\| (\([^|]*|table 1) \|[^|]*\| ([^|]*) \|$", (PAGES / "theory.md").read_text(), re.MULTILINE
+    )
+    assert len(rows) >= 9
+    for label, named in rows:
+        texts, folder = [], ""
+        for name in re.findall(r"`([\w/]+\.py)`", named):
+            folder = name.rpartition("/")[0] or folder
+            file = ROOT / "shellform" / name
+            file = file if file.is_file() else ROOT / "shellform" / folder / name
+            texts.append(file.read_text(encoding="utf-8"))
+        if label == "table 1":
+            assert all(label in text for text in texts)
+            continue
+        ours = {int(each) for each in re.findall(r"\d+", label)}
+        assert all(cited(text) & set(range(min(ours), max(ours) + 1)) for text in texts), label
+        assert ours <= set().union(*map(cited, texts)), label
+
+
+def test_the_probability_that_an_example_shows_is_the_one_that_is_told():
+    shown = r'"drawn": (\d+), "standing": (\d+), "at_least": ([\d.]+)'
+    drawn, standing, least = re.search(shown, (PAGES / "reference/run.md").read_text()).groups()
+    assert abs(counted(int(drawn), int(standing), seed=0).at_least - float(least)) < 1e-3
 
 
 def test_speeds_of_another_version_are_told_as_such(monkeypatch):

@@ -1,5 +1,6 @@
 """`shellform render`: which files it writes for which wish, and what it refuses."""
 
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from shellform.run.figures import FAILURE, Wish, draw_designs, draw_failure, dra
 from shellform.run.films import draw_film
 from shellform.run.folder import read_run
 from shellform.run.scales import colour_limit
+from tests.command import shellform
 
 ROOT = Path(__file__).parent.parent.parent
 NOTHING = {
@@ -71,7 +73,9 @@ def test_a_quantity_and_a_view_stand_in_the_file_s_name(run, quantity):
     assert np.ptp(np.asarray(Image.open(files[0]))) > 100
 
 
-def test_histories_are_drawn_from_the_run_s_file_and_missed_where_nothing_was_optimised(run):
+def test_histories_are_drawn_from_the_run_s_file_as_wide_as_asked_and_missed_where_nothing_was_optimised(
+    run, tmp_path
+):
     with pytest.raises(InputError, match=r"history.csv: isn't there: nothing was optimised yet"):
         draw_designs(run, Wish(quantity="history"))
     text = (
@@ -83,7 +87,23 @@ def test_histories_are_drawn_from_the_run_s_file_and_missed_where_nothing_was_op
         "objective.pdf",
         "constraints.pdf",
     ]
+    paper = ["--quantity", "history", "--format", "svg", "--width-mm", "85", "--font-size", "7"]
+    assert shellform("render", run.folder, *paper, "--output", tmp_path).returncode == 0
+    for name in ("objective.svg", "constraints.svg"):
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        assert 25.4 / 72.0 * float(re.search(r'width="([\d.]+)pt"', text)[1]) == pytest.approx(85.0, abs=0.1)
+        assert {*re.findall(r"font(?:-size)?:[^;]*?([\d.]+)px", text)} == {"7"}
     (run.folder / "history.csv").unlink()
+
+
+def test_a_net_s_springs_are_drawn_as_wide_and_up_to_what_is_asked(run, tmp_path):
+    asked = wish(
+        **{**NOTHING, "quantity": "spring", "kind": "svg", "limit": 5.0}, width_mm=85.0, folder=tmp_path
+    )
+    (file,) = draw_designs(run, asked)
+    text = file.read_text(encoding="utf-8")
+    assert 25.4 / 72.0 * float(re.search(r'width="([\d.]+)pt"', text)[1]) == pytest.approx(85.0, abs=0.1)
+    assert ">5.00 EI/s²<" in text
 
 
 def test_scales_end_at_one_two_or_five_times_a_power_of_ten():
@@ -249,6 +269,7 @@ def test_the_options_of_the_command_become_a_wish():
         ({"kind": "gif"}, "Known: png, svg, pdf"),
         ({"quantity": "colour"}, "Known: deviation, utilisation, curvature, shear, spring, mode, history"),
         ({"size": "640"}, "WIDTHxHEIGHT"),
+        ({"limit": 0.0}, "--limit: must be positive"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(given, message):

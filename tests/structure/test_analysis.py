@@ -63,6 +63,29 @@ def test_a_rod_too_long_for_its_supports_is_solved_without_a_load():
     assert straight.equilibrium.negative > 0
 
 
+@pytest.mark.parametrize("method", ["relaxation", "dynamic", "newton"])
+def test_at_a_load_factor_of_nought_the_state_without_load_is_found(method):
+    found = analyse(toggle(), factor=0.0, method=method)
+    assert found.converged
+    assert found.equilibrium.stable
+    assert np.abs(found.equilibrium.state.positions - toggle().network.nodes).max() < 1e-12
+    assert found.warnings == ()
+
+
+def test_a_strut_that_would_buckle_without_load_is_told_to_be_off_its_branch_at_a_factor_of_nought():
+    """Held straight and 1 % too short: no load moves it, and no path leads on."""
+    network = chain(line(8), (1e4, 1.0, 0.2, 0.2), {0: PIN, 8: PIN})
+    moved = np.zeros((9, 6))
+    moved[8, 0] = -0.01
+    start = from_vectors(line(8, 0.99), np.zeros((9, 3)))
+    load = load_at(network, 4, [0.0, 0.0, -0.1])
+    found = analyse(
+        Model(in_plane(replace(network, imposed=moved)), {"down": load}, start, (0, 8)), factor=0.0
+    )
+    assert not found.equilibrium.stable
+    assert found.on_branch is False
+
+
 def shallow_truss(elements=1):
     """Von Mises' truss: half span 1 m, rise 0.1 m, EA = 1 kN; it bears 0.38109 N."""
     points = polyline([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.1], [1.0, 0.0, 0.0]], elements)

@@ -4,7 +4,6 @@ the springs.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +22,12 @@ def draw_net(net: Net, folder: str | Path) -> list[Path]:
     return [draw_map(net, name, target / f"net-{name}.png") for name in _MAPS]
 
 
-def draw_map(net: Net, name: str, path: Path, *, look: Look | None = None) -> Path:
+def draw_map(net: Net, name: str, path: Path) -> Path:
     """Writes one of the maps "distance", "curvature", "skew" and "springs"; its colours end at the largest
     value.
     """
     panel = panel_of(net, name)
-    render.picture(path, panel, replace(look or Look(), limit=limit_of(panel)))
+    render.picture(path, panel, Look(limit=limit_of(panel)))
     return path
 
 

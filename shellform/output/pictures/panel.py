@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -151,6 +151,24 @@ class Look:
             )
         if self.frame is not None:
             object.__setattr__(self, "frame", reals("frame", self.frame, (None, 3)))
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A picture in print: its `width`, m, pixels an inch `dots`, and height of the letters, points."""
+
+    width: float
+    dots: float = 300.0
+    letters: float = 9.0  # the smallest capitals are then 2 mm high
+
+    def size(self, shape: tuple[int, int]) -> tuple[int, int]:
+        """Pixels of a picture with the proportions of `shape`."""
+        across = round(self.width / 0.0254 * self.dots)
+        return across, round(across * shape[1] / shape[0])
+
+    def look(self, look: Look) -> Look:
+        """The look as it is printed, in its proportions."""
+        return replace(look, size=self.size(look.size), dots=self.dots, letters=self.letters)
 
 
 @dataclass(frozen=True)

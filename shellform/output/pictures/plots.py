@@ -27,7 +27,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.output.pictures.curves import read_history as read_history
 from shellform.output.pictures.legend import Ramp, Word
-from shellform.output.pictures.panel import FORMATS
+from shellform.output.pictures.panel import FORMATS, Look
 from shellform.quantities import number
 from shellform.records.words import constraint_titles
 from shellform.written import path_to_write, whole
@@ -36,6 +36,7 @@ _COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")  #
 _DASHES = ("-", "--", ":")  # taken one by one when the colours are used up
 _FAR = -1.5  # values further below their limit than this run out of the picture: what is near is what counts
 _DOTS = 160.0  # pixels an inch
+HISTORY = Look(size=(1280, 704), dots=_DOTS, letters=10.0)
 _INCH, _POINTS = 25.4, 72.0  # mm and points in an inch
 _CAPITAL = 0.73  # height of a capital over the font's size
 _WIDE = 3.0  # value / limit - 1 above which the axis turns logarithmic beyond 1
@@ -47,15 +48,16 @@ def objective_history(
     terms: Mapping[str, Sequence[float]],
     *,
     cables: Sequence[float] | None = None,
+    look: Look | None = None,
 ) -> None:
     """Figure 10: the objective and its weighted terms at each accepted design, and `cables` in tension if
-    given.
+    given. Of a `look` the size, the letters and the background count.
 
     The ending of `path` chooses the format: png, svg or pdf. Raises InputError for other endings and uneven
     columns.
     """
     at, lines = _columns(evaluation, terms)
-    figure, axes = _figure()
+    figure, axes = _figure(look or HISTORY)
     axes.plot(at, np.sum(list(lines.values()), axis=0), color="black", linewidth=2.0, label="objective")
     _curves(axes, at, lines)
     axes.set(xlabel="design evaluations", ylabel="objective and its terms")
@@ -71,22 +73,27 @@ def objective_history(
         beside.set_ylim(bottom=0.0, top=1.1 * float(np.nanmax(count, initial=1.0)))
         beside.yaxis.set_major_locator(MaxNLocator(integer=True))
         beside.tick_params(axis="y", colors="#6a6a6a")
+        _lettered(beside, (look or HISTORY).letters)
         beside.spines[["top", "left"]].set_visible(False)
         beside.spines["right"].set_color("#b0b0b0")
     _save(figure, path)
 
 
 def constraint_history(
-    path: str | Path, evaluation: Sequence[float], constraints: Mapping[str, Sequence[float]]
+    path: str | Path,
+    evaluation: Sequence[float],
+    constraints: Mapping[str, Sequence[float]],
+    *,
+    look: Look | None = None,
 ) -> None:
     """Figure 11: value over limit, minus 1, of each constraint at each accepted design; feasible at and below
     zero.
 
     Linear, or, where a value exceeds 3, linear between -1 and 1 and logarithmic beyond; what is below -1.5 is
-    out of the picture. `path` as in `objective_history`.
+    out of the picture. `path` and `look` as in `objective_history`.
     """
     at, lines = _columns(evaluation, constraints)
-    figure, axes = _figure()
+    figure, axes = _figure(look or HISTORY)
     titles = constraint_titles(lines)
     _curves(axes, at, {titles[name]: line for name, line in lines.items()})
     values = np.concatenate(list(lines.values()))
@@ -108,7 +115,7 @@ def constraint_history(
     for word, offset, foot in [("infeasible", 4, "bottom"), ("feasible", -4, "top")]:
         axes.annotate(
             word, (1.0, 0.0), (-6, offset), xycoords=("axes fraction", "data"), textcoords="offset points",
-            ha="right", va=foot, color="#5a5a5a", style="italic",
+            ha="right", va=foot, color="#5a5a5a", style="italic", fontsize=axes.xaxis.label.get_fontsize(),
         )  # fmt: skip
     axes.set(xlabel="design evaluations", ylabel="value / limit − 1")
     _save(figure, path)
@@ -244,16 +251,29 @@ def plan_map(
     _write(figure, path_to_write(path, *FORMATS), 120)
 
 
-def _figure() -> tuple[Figure, Axes]:
-    figure = Figure(figsize=(8.0, 4.4), layout="constrained")
+def _figure(look: Look) -> tuple[Figure, Axes]:
+    ground = "none" if look.transparent else "white"
+    figure = Figure(
+        figsize=(look.size[0] / look.dots, look.size[1] / look.dots),
+        dpi=look.dots,
+        layout="constrained",
+        facecolor=ground,
+    )
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
+    axes = figure.add_subplot(facecolor=ground)
     axes.grid(color="#e0e0e0", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.margins(x=0.02)
+    _lettered(axes, look.letters)
     return figure, axes
+
+
+def _lettered(axes: Axes, letters: float) -> None:
+    axes.tick_params(labelsize=letters)
+    for label in (axes.xaxis.label, axes.yaxis.label):
+        label.set_fontsize(letters)
 
 
 def _curves(axes: Axes, at: Reals, lines: Mapping[str, Reals]) -> None:
@@ -268,8 +288,10 @@ def _curves(axes: Axes, at: Reals, lines: Mapping[str, Reals]) -> None:
 def _save(figure: Figure, path: str | Path) -> None:
     """Writes all of the file or nothing; the same history gives the same bytes."""
     target = path_to_write(path, *FORMATS)
-    figure.legend(loc="outside right upper", frameon=False)
-    _write(figure, target, 160)
+    figure.legend(
+        loc="outside right upper", frameon=False, fontsize=figure.axes[0].xaxis.label.get_fontsize()
+    )
+    _write(figure, target, figure.dpi)
 
 
 def _write(figure: Figure, target: Path, resolution: float) -> None:
