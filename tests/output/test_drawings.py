@@ -331,6 +331,12 @@ def test_the_title_block_says_who_drew_it_and_when_as_the_case_does(built, tmp_p
     assert (properties["Date"], properties["Revision"]) == ("2026-05-31", "B")
 
 
+def test_a_job_s_title_of_two_lines_leaves_the_file_sound(built, tmp_path):
+    told = replace(built, title="Shell\nof two\r\nlines")
+    file = drawings.write_dxf(tmp_path / "grid.dxf", layout.flat_grid(told), told)
+    assert dict(ezdxf.readfile(file).header.custom_vars.properties)["Job"] == "Shell of two lines"
+
+
 def words_on(sheet, layer):
     return [mark for mark in sheet.marks if isinstance(mark, Words) and mark.layer == layer]
 

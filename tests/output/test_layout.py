@@ -120,6 +120,7 @@ def test_segments_are_counted_wherever_the_grid_begins():
 
 def test_names_of_rods_stand_in_the_segment_nearest_to_their_middles_to_their_left(built):
     """Of two segments as near the first: from 0 to 2 m, and from 0 to 1.5 m."""
+    built.shell.net.supports = np.concatenate([GRID.rods[k].nodes[[0, -1]] for k in (1, 4)])
     for name, rod, place in (
         ("U1", GRID.rods[1], (1000.0, 1500.0 + 0.03 * S)),
         ("V4", GRID.rods[4], (2000.0 - 0.03 * S, 750.0)),
@@ -134,7 +135,7 @@ def test_names_of_rods_stand_in_the_segment_nearest_to_their_middles_to_their_le
 
 def test_a_rod_with_one_crossing_or_an_uneven_one_is_named_where_its_middle_is_nearest(built):
     flat = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]])
-    plan = SimpleNamespace(grid=SimpleNamespace(flat=flat))
+    plan = SimpleNamespace(grid=SimpleNamespace(flat=flat), shell=built.shell)
     for marks, at in (([4.0], 5.0), ([1.0, 3.0, 9.0], 6.0), ([0.5, 4.5, 7.5], 6.0), ([3.0, 4.6, 9.0], 3.8)):
         rod = SimpleNamespace(direction="u", nodes=np.array([0, 1]), length=10.0, marks=np.array(marks))
         assert layout._rod(plan, "U0", rod, S)[-1].place[0] == pytest.approx(1e3 * at)
@@ -312,3 +313,23 @@ def test_a_dimension_in_the_file_measures_along_its_own_direction():
         (0.0, (1.0, 5.0), (9.0, 5.0), (1.0, 2.0), "8.0"),
         (90.0, (1.0, 5.0), (1.0, 9.0), (0.0, 5.0), "4.0"),
     ]
+
+
+def test_squares_on_the_flat_grid_stand_at_ends_that_are_supports_alone(built):
+    """Of the grid's first and last node; edge beams hold the other ends."""
+    marks = [mark for rod in GRID.rods for mark in layout._rod(built, "", rod, S)]
+    squares = on(marks, "SUPPORTS", Stroke)
+    ends = 1e3 * GRID.flat[[0, -1], :2]
+    np.testing.assert_allclose([np.mean(each.points[:4], axis=0) for each in squares], ends, atol=1e-9)
+
+
+def test_supports_on_one_level_are_told_once():
+    place = np.array([[1.0, 2.0, 0.5], [3.0, 5.0, 2.0], [6.0, 4.0, 0.50004]])
+    grid = SimpleNamespace(rods=(SimpleNamespace(direction="v", nodes=np.arange(3)),))
+    shell = SimpleNamespace(
+        net=SimpleNamespace(edges=(), supports=np.array([0, 2])), target=SimpleNamespace(positions=place)
+    )
+    marks = setting_out.elevations(
+        SimpleNamespace(grid=grid, shell=shell, origin=None, origin_notes=())
+    ).marks
+    assert [mark.text for mark in on(marks, "LEVELS", Words)] == 2 * ["supports +500.0", "crown +2000.0"]

@@ -93,8 +93,8 @@ def _saved(target: Path, sheet: Sheet, built: Built | None) -> Path:
         told = {"Job": built.title, "Drawing": sheet.title, "Design": built.name}
         told |= {"Date": built.block.date, "Revision": built.block.revision, "Author": built.block.author}
         for name, said in told.items():
-            if said:
-                document.header.custom_vars.append(name, said)
+            if said:  # a line of the file each
+                document.header.custom_vars.append(name, " ".join(said.split()))
     document.styles.new("LETTERS", dxfattribs={"font": "arial.ttf"})
     used = {mark.layer for mark in sheet.marks}
     for name, pen in PENS.items():

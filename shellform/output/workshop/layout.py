@@ -90,7 +90,8 @@ def _crossings(built: Built, s: float) -> list[Mark]:
 
 
 def _rod(built: Built, name: str, rod: GridRod, s: float) -> list[Mark]:
-    """The rod, and its name in the segment nearest to its middle."""
+    """The rod, squares at its ends that are supports, and its name in the segment nearest to its middle."""
+    stand = [end for end in (0, -1) if rod.nodes[end] in built.shell.net.supports]
     ends = MM * built.grid.flat[rod.nodes[[0, -1]], :2]
     angle, along, left = _directions(rod)
     places = MM * rod.marks
@@ -98,7 +99,7 @@ def _rod(built: Built, name: str, rod: GridRod, s: float) -> list[Mark]:
     at = float(middles[np.argmin(np.abs(middles - 0.5 * MM * rod.length))])
     return [
         Stroke(f"RODS_{rod.direction.upper()}", (point_of(ends[0]), point_of(ends[1]))),
-        *(square(end, 0.03 * s) for end in ends),
+        *(square(ends[end], 0.03 * s) for end in stand),
         Words(
             "ROD_NAMES",
             point_of(ends[0] + at * along + 0.03 * s * left),

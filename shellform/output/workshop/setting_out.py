@@ -138,7 +138,9 @@ def elevations(built: Built) -> Sheet:
     feet = place[built.shell.net.supports, 2]
     crown = float(place[:, 2].max())
     levels = {f"crown {crown:+.1f}": crown}
-    if len(feet):
+    if len(feet) and f"{feet.min():+.1f}" == f"{feet.max():+.1f}":
+        levels[f"supports {feet.min():+.1f}"] = float(feet.min())
+    elif len(feet):
         levels[f"highest support {feet.max():+.1f}"] = float(feet.max())
         levels[f"lowest support {feet.min():+.1f}"] = float(feet.min())
     marks: list[Mark] = []
