@@ -113,6 +113,23 @@ def shallow_truss(elements=1):
     return Model(network, {"down": down}, None, (0, 2 * elements)), exact.shallow_truss(1.0, 0.1, 1e3)[0]
 
 
+def test_a_truss_that_moves_only_one_way_has_a_mode_and_the_critical_factor_of_the_closed_form():
+    """Its critical factor was refused, since what moves only one way has no modes."""
+    model, limit = shallow_truss()
+    fixed = np.ones_like(model.network.fixed)
+    fixed[1, 2] = False
+    found = analyse(
+        replace(model, network=replace(model.network, fixed=fixed)),
+        factor=1e-3,
+        critical_to=2.0,
+        mode_count=1,
+    )
+    assert found.critical.factor == pytest.approx(limit, rel=1e-5)
+    assert found.critical.kind == "limit point"
+    # EA sin² / l of both bars, 1e3 / 100 / 1.01^1.5 N/m each, falls by a thousandth of the load
+    assert found.modes.stiffness[0] == pytest.approx(20.0 / 1.01**1.5, rel=5e-3)
+
+
 @pytest.mark.parametrize("times", [1.01, 1.3, 2.6, 5.0, 25.0, 80.0, 250.0])
 @pytest.mark.parametrize(("increments", "way"), [(1, 1.0), (3, 1.0), (10, -1.0)])
 def test_a_truss_under_more_than_its_limit_load_has_snapped_whatever_the_increments(times, increments, way):
