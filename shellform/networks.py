@@ -242,15 +242,7 @@ def _built(
             "version": 1,
             "nodes": [list(map(float, place)) for place in places],
             "beams": [{"nodes": [int(a), int(b)], **of_rods, **own} for a, b, own in rods],
-            "cables": [
-                {
-                    "nodes": [int(a), int(b)],
-                    "EA": float(cable or 0.0),
-                    "rest_length": _length(places, a, b),
-                    **own,
-                }
-                for a, b, own in cables
-            ],
+            "cables": [{"nodes": [int(a), int(b)], "EA": float(cable or 0.0), **own} for a, b, own in cables],
             "supports": [{"node": int(node), "fixed": _FIXED[how]} for node, how in sorted(held.items())],
             "loads": {
                 name: [
@@ -317,10 +309,6 @@ def _supported(supports: Mapping[int, str] | Sequence[int]) -> dict[int, Any]:
             remedy='Give numbers counted from 0, or each with "pinned" or "fixed"; of flags np.flatnonzero(flags).',
         )
     return held
-
-
-def _length(places: Sequence[Sequence[float]], a: int, b: int) -> float:
-    return float(np.linalg.norm(np.subtract(places[b], places[a])))
 
 
 def _three(where: str, given: Any, remedy: str) -> list[float]:

@@ -306,3 +306,11 @@ def test_a_section_gives_the_stiffnesses_and_the_model_is_solved():
 def test_what_is_no_network_is_refused_with_where_it_is_wrong(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_a_cable_between_nodes_in_one_place_is_refused_with_what_to_do():
+    """It was told to leave its rest length out, which it had."""
+    with pytest.raises(
+        InputError, match=r"cables\[0\]: the cable's nodes must not coincide.*give the cable's rest_length"
+    ):
+        sf.networks.from_arrays([[0, 0, 0], [1, 0, 0], [1, 0, 0]], cables=[[1, 2]], cable=187.0, supports=[0])

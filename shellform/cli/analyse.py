@@ -90,7 +90,7 @@ def analyse(
 
         for file in draw_analysis(analysis, figures):
             print(file, file=sys.stderr)
-    if not analysis.converged:
+    if analysis.message:
         raise NotConverged(analysis.message)
 
 

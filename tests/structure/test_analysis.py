@@ -86,12 +86,71 @@ def test_a_strut_that_would_buckle_without_load_is_told_to_be_off_its_branch_at_
     assert found.on_branch is False
 
 
+def tied_rod(pulls=-2.0):
+    """A rod of 1 m, 10 mm off straight, and a cable of 0.8 m between its ends that isn't at rest as drawn."""
+    points = line(12)
+    points[:, 2] = 0.01 * np.sin(np.pi * points[:, 0])
+    network = in_plane(chain(points, (2e6, 6.0, 8.0, 8.0), {0: PIN}))
+    fixed = np.array(network.fixed)
+    fixed[12, 2] = True
+    tie = make_cables([[0, 12]], rest_length=0.8, stiffness=1e4)
+    model = Model(replace(network, cables=tie, fixed=fixed), {}, None, (0, 12))
+    return replace(model, loads={"down": load_at(model.network, 6, [0.0, 0.0, pulls])})
+
+
+def test_a_rod_that_its_cable_bends_is_loaded_from_where_it_is_at_rest():
+    """It was told to have left its branch at nothing, and had neither a path nor a critical factor."""
+    model = tied_rod()
+    at_ease = analyse(model, load="none").equilibrium.state
+    bent = replace(model, start=at_ease)
+    for method in ("relaxation", "path"):
+        found, expected = (analyse(each, method=method) for each in (model, bent))
+        assert (found.converged, found.on_branch, found.warnings) == (True, True, ())
+        np.testing.assert_allclose(
+            found.equilibrium.state.positions, expected.equilibrium.state.positions, rtol=0.0, atol=1e-8
+        )
+    found, expected = (analyse(each, critical_to=400.0) for each in (model, bent))
+    assert found.critical.factor == pytest.approx(expected.critical.factor, rel=1e-6)
+    assert found.critical_mesh.fine == pytest.approx(expected.critical_mesh.fine, rel=5e-3)
+
+
+def test_an_equilibrium_stays_where_no_critical_factor_is_found_beside_it():
+    """It was told not to have converged, with the unloaded state and reactions that didn't bear the load."""
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    network = ropes(points, make_cables([[0, 1], [1, 2]], rest_length=[1.2, 1.3], stiffness=1e4), [0, 2])
+    model = Model(network, {"down": load_at(network, 1, [0.0, 0.0, -1.0])}, None, (0, 2))
+    found = analyse(model, critical_to=3.0)
+    assert found.converged
+    assert found.message.startswith("The critical factor was not found: The path could not be followed")
+    assert "critical" not in result(found)
+    assert found.reactions[[0, 2], 2].sum() == pytest.approx(1.0, rel=1e-6)
+    alone = analyse(model).equilibrium
+    np.testing.assert_array_equal(found.equilibrium.state.positions, alone.state.positions)
+
+
 def shallow_truss(elements=1):
     """Von Mises' truss: half span 1 m, rise 0.1 m, EA = 1 kN; it bears 0.38109 N."""
     points = polyline([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.1], [1.0, 0.0, 0.0]], elements)
     network = in_plane(chain(points, (1e3, 1e-7, 1e-7, 1e-7), {0: PIN, 2 * elements: PIN}))
     down = load_at(network, elements, [0.0, 0.0, -1.0])
     return Model(network, {"down": down}, None, (0, 2 * elements)), exact.shallow_truss(1.0, 0.1, 1e3)[0]
+
+
+def test_a_truss_that_moves_only_one_way_has_a_mode_and_the_critical_factor_of_the_closed_form():
+    """Its critical factor was refused, since what moves only one way has no modes."""
+    model, limit = shallow_truss()
+    fixed = np.ones_like(model.network.fixed)
+    fixed[1, 2] = False
+    found = analyse(
+        replace(model, network=replace(model.network, fixed=fixed)),
+        factor=1e-3,
+        critical_to=2.0,
+        mode_count=1,
+    )
+    assert found.critical.factor == pytest.approx(limit, rel=1e-5)
+    assert found.critical.kind == "limit point"
+    # EA sin² / l of both bars, 1e3 / 100 / 1.01^1.5 N/m each, falls by a thousandth of the load
+    assert found.modes.stiffness[0] == pytest.approx(20.0 / 1.01**1.5, rel=5e-3)
 
 
 @pytest.mark.parametrize("times", [1.01, 1.3, 2.6, 5.0, 25.0, 80.0, 250.0])

@@ -8,7 +8,7 @@ import pytest
 
 from shellform.errors import NotConverged
 from shellform.structure.answers import analysis, halved
-from shellform.structure.answers.halved import Refined, critical_error
+from shellform.structure.answers.halved import Refined, critical_error, too_coarse
 from shellform.structure.elements.state import at_rest
 from shellform.structure.model import Model
 from shellform.structure.network import assemble
@@ -210,10 +210,10 @@ def test_an_error_of_a_mesh_is_four_thirds_of_what_halves_change():
     ],
 )  # fmt: skip
 def test_a_mesh_is_told_to_be_coarse_from_half_a_per_cent_on_to_either_side(fine, said):
-    told = analysis._coarse(Refined(20.0, fine))
+    told = too_coarse(Refined(20.0, fine))
     assert (told == []) == (said is None)
     assert said is None or said in told[0]
-    assert analysis._coarse(None) == []
+    assert too_coarse(None) == []
 
 
 def test_the_finer_mesh_is_followed_half_as_far_again_from_its_own_start(monkeypatch):

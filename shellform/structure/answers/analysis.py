@@ -20,7 +20,7 @@ import numpy as np
 
 from shellform.arrays import Reals, Record
 from shellform.errors import NotConverged
-from shellform.structure.answers.halved import Refined, critical_error
+from shellform.structure.answers.halved import Refined, critical_error, too_coarse
 from shellform.structure.answers.increments import LoadIncrement, PathIncrement, Reached, Waypoint
 from shellform.structure.answers.request import (
     check_imposed_turns,
@@ -40,11 +40,11 @@ from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.loading import advance
 from shellform.structure.solve.path import follow
 from shellform.structure.solve.residual import Drowned, Turning
-from shellform.structure.solve.settled import settle
+from shellform.structure.solve.settled import prestressed, settle
 from shellform.structure.solve.walk import Lead
 
 LIMIT = 1000  # factorisations of one relaxation
-_COARSE = 0.005  # of a critical factor, the error above which it is told
+_TIMED = ("assembly", "factorisation", "solve")
 _TURNING = 200  # the same under moments without potential, before their path is followed instead
 
 PathWatch = Callable[[float, int], None]
@@ -57,9 +57,10 @@ class Analysis(Record):
 
     `load` (n, 6) at that state; `reactions` (n, 6), what held degrees of freedom bear there, N and N·m;
     `converged`; the `increments` by which it was come to, or the points of a path; `modes` and `critical`
-    where they were asked for; `warnings`, a sentence each. `on_branch`: whether the state lies on the stable
-    branch from the start; None where Newton's method doesn't tell. `critical_sought`: the factor up to which
-    no other is critical, 0 where that wasn't found out; `critical_mesh`: on this mesh and with beams halved.
+    where they were asked for; a `message` of what wasn't found; `warnings`, a sentence each. `on_branch`:
+    whether the state lies on the stable branch from the start; None where Newton's method doesn't tell.
+    `critical_sought`: the factor up to which no other is critical, 0 where that wasn't found out;
+    `critical_mesh`: on this mesh and with beams halved.
     """
 
     model: Model
@@ -99,7 +100,8 @@ def analyse(
     only the loads grow. `lead` (node, axis 0 to 2, displacement in m) leads a path by a free displacement
     instead of by its length. `limit` bounds the factorisations of a relaxation. `mode_count` softest modes
     are found at the end; with `critical_to` the critical load factor up to that multiple of the load. Where
-    no equilibrium is found the last one is kept and `converged` is false. Raises InputError for bad requests.
+    no equilibrium is found the last one is kept and `converged` is false; where one is, but no modes or end
+    of the search for a critical factor, it stays as it is. Raises InputError for bad requests.
     """
     began = time.perf_counter()
     chosen = chosen_load(model, load)
@@ -112,28 +114,26 @@ def analyse(
     message, converged = "", True
     critical, softest, mesh, sought = None, None, None, 0.0
     try:
-        walk.begin()
-        origin = walk.state
+        walk.begin(method)
         if method == "path":
             walk.path(None if lead is None else Lead(*lead), increments)
         else:
             walk.increments(increments, method)
-        if critical_to is not None:
-            critical = critical_load(assembly, origin, walk.drive, goal=critical_to, tolerance=tolerance)
-            sought = critical_to
-            if critical is not None:
-                mesh = critical_error(
-                    model, walk.drive, critical.factor, goal=critical_to, tolerance=tolerance
-                )
-        if mode_count:
-            softest = modes(fit_for(assembly, walk.state), walk.state, mode_count)
     except NotConverged as error:
         converged, message = False, str(error)
         walk.keep(error)
+    if converged and critical_to is not None:
+        critical, mesh, message = walk.critical(critical_to)
+        sought = 0.0 if message else critical_to
+    if converged and mode_count:
+        try:
+            softest = modes(fit_for(assembly, walk.state), walk.state, mode_count)
+        except NotConverged as error:
+            message = f"{message} {error}".lstrip()
     found = walk.found
     if found is None:  # not even the start: what there is of it
         found = walk.measured(walk.state, np.inf)
-    loaded = walk.drive.at(walk.reached)
+    loaded, clock = walk.drive.at(walk.reached), assembly.clock
     return Analysis(
         model=model,
         load=loaded,
@@ -141,14 +141,14 @@ def analyse(
         equilibrium=replace(found, factorisations=walk.spent),
         converged=converged,
         increments=tuple(walk.behind),
-        seconds=_seconds(assembly, time.perf_counter() - began),
+        seconds={each: clock.get(each, 0.0) for each in _TIMED} | {"total": time.perf_counter() - began},
         message=message,
         warnings=(
             *doubts(model.network),
             *lost_moments(model.network, chosen),
             *free_to_swing(walk.swinging),
             *walk.warnings(),
-            *_coarse(mesh),
+            *too_coarse(mesh),
         ),
         modes=softest,
         critical=critical,
@@ -192,20 +192,25 @@ class _Analysis:
             if self.model.start is None
             else with_supports_moved(network, self.model.start)
         )
+        self.origin = self.state
 
-    def begin(self) -> None:
-        """The unloaded equilibrium from which the loading begins."""
-        if self.model.start is None:
-            return
-        found = find_equilibrium(
-            self.assembly,
-            self.state,
-            self.drive.at(0.0),
-            tolerance=self.tolerance,
-            limit=self.limit,
-            progress=self._watch(0.0),
-        )
-        self.accept(found, 0.0, found.factorisations)
+    def begin(self, method: str = "relaxation") -> None:
+        """The unloaded equilibrium from which the loading begins, of a given start or a prestressed model; of
+        the latter where it is stable, and not by methods that take whole increments."""
+        load, watch = self.drive.at(0.0), self._watch(0.0)
+        if self.model.start is not None:
+            found = find_equilibrium(
+                self.assembly, self.state, load, tolerance=self.tolerance, limit=self.limit, progress=watch
+            )
+            self.accept(found, 0.0, found.factorisations)
+        elif method not in ("newton", "dynamic"):
+            rest, spent = prestressed(
+                self.assembly, self.state, load, tolerance=self.tolerance, limit=self.limit, progress=watch
+            )
+            self.spent += spent
+            if rest is not None:
+                self.accept(rest, 0.0, 0)
+        self.origin = self.state
 
     def increments(self, count: int, method: str) -> None:
         """Equal increments up to the factor."""
@@ -308,6 +313,19 @@ class _Analysis:
             self.behind.append(PathIncrement(reached, point.rate, point.event))
             before = spent
 
+    def critical(self, goal: float) -> tuple[Critical | None, Refined | None, str]:
+        """The critical load up to the factor `goal`, if there is one, that of the finer mesh beside it, and
+        what to say where that isn't found out."""
+        drive, tolerance = self.drive, self.tolerance
+        try:
+            found = critical_load(self.assembly, self.origin, drive, goal=goal, tolerance=tolerance)
+        except NotConverged as error:
+            said = f"The critical factor was not found: {error.what}."
+            return None, None, f"{said} Seek it up to a smaller one, or give a stable start that is at rest."
+        if found is None:
+            return None, None, ""
+        return found, critical_error(self.model, drive, found.factor, goal=goal, tolerance=tolerance), ""
+
     def _left(self, factor: float) -> None:
         """Takes down where the stable branch first ended."""
         self.on_branch = False
@@ -376,20 +394,3 @@ class _Analysis:
             return None
         tell = self.progress
         return lambda factorisations, residual: tell(factor, self.spent + factorisations)
-
-
-def _coarse(mesh: Refined | None) -> list[str]:
-    """What has to be said of a critical factor that the size of the elements decides, in a sentence."""
-    if mesh is None or abs(mesh.error) <= _COARSE * abs(mesh.coarse):
-        return []
-    share = 100.0 * abs(mesh.error / mesh.coarse)
-    side = "high" if mesh.error * mesh.coarse > 0.0 else "low"
-    return [
-        f"The critical factor {mesh.coarse:.6g} is about {share:.1f} % too {side}, by the same with "
-        f"beams halved (extrapolated {mesh.extrapolated:.6g}): divide the rods into more elements."
-    ]
-
-
-def _seconds(assembly: Assembly, total: float) -> dict[str, float]:
-    clock = assembly.clock
-    return {**{name: clock.get(name, 0.0) for name in ("assembly", "factorisation", "solve")}, "total": total}

@@ -29,7 +29,9 @@ from shellform.structure.model import Model
 from shellform.structure.network import Network, assemble
 from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.settled import prestressed
 
+_COARSE = 0.005  # of a critical factor, the error above which it is told
 _CORNER = np.radians(30.0)  # between two beams that don't stand for a curve
 
 
@@ -66,13 +68,28 @@ def critical_error(
     assembly = assemble(finer.network)
     try:
         state = at_rest(finer.network.nodes)
-        if finer.start is not None:
+        if finer.start is None:
+            rest, _ = prestressed(assembly, state, wider.at(0.0), tolerance=tolerance)
+            state = state if rest is None else rest.state
+        else:
             begun = with_supports_moved(finer.network, finer.start)
             state = find_equilibrium(assembly, begun, wider.at(0.0), tolerance=tolerance).state
         found = critical_load(assembly, state, wider, goal=1.5 * goal, first=0.1 / 1.5, tolerance=tolerance)
     except NotConverged:
         return None
     return None if found is None else Refined(factor, found.factor)
+
+
+def too_coarse(mesh: Refined | None) -> list[str]:
+    """What has to be said of a critical factor that the size of the elements decides, in a sentence."""
+    if mesh is None or abs(mesh.error) <= _COARSE * abs(mesh.coarse):
+        return []
+    share = 100.0 * abs(mesh.error / mesh.coarse)
+    side = "high" if mesh.error * mesh.coarse > 0.0 else "low"
+    return [
+        f"The critical factor {mesh.coarse:.6g} is about {share:.1f} % too {side}, by the same with "
+        f"beams halved (extrapolated {mesh.extrapolated:.6g}): divide the rods into more elements."
+    ]
 
 
 def halved(model: Model) -> Model:

@@ -77,11 +77,13 @@ def modes(assembly: Assembly, state: State, count: int) -> Modes:
     InputError for a bad count, NotConverged.
     """
     size = len(assembly.free)
-    if size < 2:
+    if not size:
         raise InputError(
-            "one that moves only one way has no modes", where="modes", remedy="Leave out some supports."
+            "a structure of which no node is free has none",
+            where="modes",
+            remedy="Ask for none, or leave out some supports.",
         )
-    require_count(count, where="modes", give=f"{min(3, size - 1)}, say", most=size - 1)
+    require_count(count, where="modes", give=f"{min(3, size)}, say", most=size)
     balance = assembly.evaluate(state)
     values = held(assembly, balance)
     solve: Callable[[Reals], Reals]

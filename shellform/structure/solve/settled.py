@@ -4,20 +4,25 @@ Increments (loading.py) end where Newton's steps lose definiteness or don't come
 are. So they do where the branch ends, but also beyond the kink of a cable that goes slack or taut, where a
 structure gets thousands of times as soft or as stiff. So the path is followed from the last stable state on
 (path.py): where it comes to the whole load without a point that isn't stable, the branch hasn't ended.
+
+A model whose parts pull at one another as it is drawn, as a rod that a shorter cable bends to a bow, isn't on
+a branch there: it comes to rest without load first (`prestressed`).
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.drive import Drive
-from shellform.structure.solve.equilibrium import TOLERANCE
+from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, Relaxing, find_equilibrium
 from shellform.structure.solve.leaps import at_rest
 from shellform.structure.solve.loading import SMALLEST, BranchPart, Loaded, Reached, follow_branch
 from shellform.structure.solve.path import FIRST, follow
+from shellform.structure.solve.residual import ResidualNorm
 
 
 def settle(
@@ -48,6 +53,28 @@ def settle(
     if way.share < 1.0:
         way = _along_path(assembly, way, drive, begin, end, tolerance, report)
     return way.ended(assembly, drive, begin, end, tolerance, stay=stay, limit=limit, report=report)
+
+
+def prestressed(
+    assembly: Assembly,
+    state: State,
+    load: Reals,
+    *,
+    tolerance: float = TOLERANCE,
+    limit: int = 1000,
+    progress: Relaxing | None = None,
+) -> tuple[Equilibrium | None, int]:
+    """The equilibrium to which a state comes that isn't one under the `load` (n, 6), mostly none, and
+    factorisations spent; None where the state is one itself, and where no stable one is found."""
+    measure, balance = ResidualNorm(assembly), assembly.evaluate(state)
+    residual = measure.residual(balance, load)
+    if measure.balanced(residual, balance, state, load, tolerance, stagnant=True):
+        return None, 0
+    try:
+        found = find_equilibrium(assembly, state, load, tolerance=tolerance, limit=limit, progress=progress)
+    except NotConverged as error:
+        return None, error.iterations
+    return found if found.stable else None, found.factorisations
 
 
 def _along_path(
