@@ -167,11 +167,13 @@ def minimise_directly(
     if resume is not None:
         _resume(search, resume)
     while search.left() > 0:
-        before = search.evaluator.evaluations
+        before = search.evaluator.evaluations, search.stage, search.margin
         _run(search)
-        if search.stage == 1.0 or search.evaluator.evaluations == before:
+        if search.stage == 1.0:
             break
         _raise_stage(search)
+        if (search.evaluator.evaluations, search.stage, search.margin) == before:
+            break  # as near to the branch's end as is allowed
     return _finished(search)
 
 
@@ -188,8 +190,7 @@ def _begun(
     evaluator = Evaluator(problem, start)
     reached = evaluator.begin()
     search = _Search(problem, solver, evaluator, evaluations, progress, keep, began, margin=solver.margin)
-    used = problem.used()
-    state = reached[search.base].equilibrium.state
+    used, state = problem.used(), reached[search.base].equilibrium.state
     if all(reached[name].on_branch for name in used):
         states = {name: reached[name].equilibrium.state for name in used}
     else:
@@ -341,9 +342,8 @@ def _resume(search: _Search, checkpoint: Checkpoint) -> None:
     for k, radius in enumerate(numbers["radii"]):
         states = {
             name: State(
-                arrays[f"{k} {name} positions"],
-                arrays[f"{k} {name} quaternions"],
-                arrays.get(f"{k} {name} tail"),
+                *(arrays[f"{k} {name} {part}"] for part in ("positions", "quaternions")),
+                tail=arrays.get(f"{k} {name} tail"),
             )
             for name in used
         }
@@ -368,11 +368,12 @@ def _finished(search: _Search) -> Optimum:
     design load, the last one before it that it does."""
     problem, shell, evaluator = search.problem, search.problem.shell, search.evaluator
     if search.stage < 1.0:
+        more = "" if search.left() > 0 else ", or more evaluations"
         raise NotConverged(
             "No design was found that carries all loads",
             state=search.best.design,
             iterations=evaluator.factorisations,
-            remedy="Choose a denser grid, thicker rods, stiffer cables, or more evaluations.",
+            remedy=f"Choose a denser grid, thicker rods, stiffer cables{more}.",
         )
     none = np.zeros((shell.node_count, 6))
     for design in reversed(search.accepted):
