@@ -203,7 +203,6 @@ def _begun(
 def _run(search: _Search) -> None:
     """One run of MMA at the present stage, what it was told already told again."""
     again = iter(list(search.told))
-    first = search.told[0].variables
     lower, upper = search.evaluator.blocks.bounds()
     most = len(search.told) + search.left()
 
@@ -216,7 +215,7 @@ def _run(search: _Search) -> None:
 
     _, reason = minimise(
         evaluate,
-        first,
+        search.told[0].variables,
         lower,
         upper,
         constraints=len(search.told[0].rows),
@@ -342,8 +341,9 @@ def _resume(search: _Search, checkpoint: Checkpoint) -> None:
     for k, radius in enumerate(numbers["radii"]):
         states = {
             name: State(
-                *(arrays[f"{k} {name} {part}"] for part in ("positions", "quaternions")),
-                tail=arrays.get(f"{k} {name} tail"),
+                arrays[f"{k} {name} positions"],
+                arrays[f"{k} {name} quaternions"],
+                arrays.get(f"{k} {name} tail"),
             )
             for name in used
         }
