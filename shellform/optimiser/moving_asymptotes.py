@@ -167,11 +167,13 @@ def minimise_directly(
     if resume is not None:
         _resume(search, resume)
     while search.left() > 0:
-        before = search.evaluator.evaluations
+        before = search.evaluator.evaluations, search.stage, search.margin
         _run(search)
-        if search.stage == 1.0 or search.evaluator.evaluations == before:
+        if search.stage == 1.0:
             break
         _raise_stage(search)
+        if (search.evaluator.evaluations, search.stage, search.margin) == before:
+            break  # as near to the branch's end as is allowed
     return _finished(search)
 
 
@@ -188,8 +190,7 @@ def _begun(
     evaluator = Evaluator(problem, start)
     reached = evaluator.begin()
     search = _Search(problem, solver, evaluator, evaluations, progress, keep, began, margin=solver.margin)
-    used = problem.used()
-    state = reached[search.base].equilibrium.state
+    used, state = problem.used(), reached[search.base].equilibrium.state
     if all(reached[name].on_branch for name in used):
         states = {name: reached[name].equilibrium.state for name in used}
     else:
@@ -202,7 +203,6 @@ def _begun(
 def _run(search: _Search) -> None:
     """One run of MMA at the present stage, what it was told already told again."""
     again = iter(list(search.told))
-    first = search.told[0].variables
     lower, upper = search.evaluator.blocks.bounds()
     most = len(search.told) + search.left()
 
@@ -215,7 +215,7 @@ def _run(search: _Search) -> None:
 
     _, reason = minimise(
         evaluate,
-        first,
+        search.told[0].variables,
         lower,
         upper,
         constraints=len(search.told[0].rows),
@@ -368,11 +368,12 @@ def _finished(search: _Search) -> Optimum:
     design load, the last one before it that it does."""
     problem, shell, evaluator = search.problem, search.problem.shell, search.evaluator
     if search.stage < 1.0:
+        more = "" if search.left() > 0 else ", or more evaluations"
         raise NotConverged(
             "No design was found that carries all loads",
             state=search.best.design,
             iterations=evaluator.factorisations,
-            remedy="Choose a denser grid, thicker rods, stiffer cables, or more evaluations.",
+            remedy=f"Choose a denser grid, thicker rods, stiffer cables{more}.",
         )
     none = np.zeros((shell.node_count, 6))
     for design in reversed(search.accepted):

@@ -1,6 +1,7 @@
 """The paper's own method: MMA directly in the rest lengths, on a coarse vault and beside a problem of
 Svanberg's."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -160,6 +161,16 @@ def test_a_direct_search_resumed_with_states_of_twice_the_digits_has_all_of_them
         np.testing.assert_array_equal(again.best.states[name].tail, state.tail)
 
 
+def test_a_stage_at_which_mma_has_converged_is_left_for_one_nearer_to_the_end_of_its_branch(coarse):
+    """A tolerance that ends each run at its first steps."""
+    asked, seen = problem(coarse, 4.0, 1.5), []
+    solver = sf.MovingAsymptotes(tolerance=0.3)
+    with suppress(NotConverged):  # whether the whole load is borne in the end isn't asked here
+        sf.optimise(asked, coarse.design(), solver=solver, evaluations=30, progress=seen.append)
+    assert seen[0].stage < 1.0
+    assert seen[-1].stage > seen[0].stage + 0.05
+
+
 def test_settings_and_starts_that_can_t_be_are_refused(coarse):
     with pytest.raises(InputError, match=r"solver\.rows"):
         sf.MovingAsymptotes(rows=0)
@@ -314,6 +325,7 @@ def finished(monkeypatch, bears, **changes):
         "base": "wet",
         "accepted": designs,
         "best": SimpleNamespace(design="best"),
+        "left": lambda: 0,
         "history": [SimpleNamespace(objective=1.0), SimpleNamespace(objective=0.4)],
         "status": "ended",
         **changes,
@@ -332,11 +344,15 @@ def test_the_last_accepted_design_comes_back_whose_path_bears_the_design_load(mo
     with pytest.raises(NotConverged, match="carries all loads") as told:
         finished(monkeypatch, {0}, stage=0.99)
     assert (told.value.state, told.value.iterations) == ("best", 99)
+    assert told.value.remedy.endswith("stiffer cables, or more evaluations.")
+    with pytest.raises(NotConverged) as told:
+        finished(monkeypatch, {0}, stage=0.99, left=lambda: 3)
+    assert told.value.remedy.endswith("thicker rods, stiffer cables.")
 
 
 @pytest.fixture
 def direct(monkeypatch):
-    """A direct search whose runs spend what is told and whose stages rise as told."""
+    """A direct search whose runs spend what is told and whose stages rise, or margins fall, as told."""
     told = SimpleNamespace(spends=[], stages=[], log=[], stage=0.5)
 
     def run(search):
@@ -345,12 +361,15 @@ def direct(monkeypatch):
 
     def raised(search):
         told.log.append("raised")
-        search.stage = told.stages.pop(0)
+        search.stage, search.margin = told.stages.pop(0)
 
     def begun(*given):
         evaluator = SimpleNamespace(evaluations=0)
         return SimpleNamespace(
-            evaluator=evaluator, stage=told.stage, left=lambda: given[3] - evaluator.evaluations
+            evaluator=evaluator,
+            stage=told.stage,
+            margin=0.2,
+            left=lambda: given[3] - evaluator.evaluations,
         )
 
     monkeypatch.setattr(moving_asymptotes, "_begun", begun)
@@ -366,15 +385,16 @@ def direct(monkeypatch):
     return told
 
 
-def test_runs_follow_stage_by_stage_until_the_whole_load_the_evaluations_end_or_none_is_spent(direct):
-    direct.spends, direct.stages = [8, 8, 5, 9], [0.7, 1.0]
+def test_runs_follow_stage_by_stage_until_the_whole_load_the_evaluations_end_or_nothing_changes(direct):
+    direct.spends, direct.stages = [8, 8, 5, 9], [(0.7, 0.2), (1.0, 0.2)]
     assert direct.ends(40, resume="there") == 21
     assert direct.log == [("resume", "there"), ("run", 0.5), "raised", ("run", 0.7), "raised", ("run", 1.0)]
     direct.log.clear()
-    direct.spends, direct.stages = [8, 0, 5], [0.7]
+    # MMA has converged: nearer to the branch's end as far as that leads anywhere
+    direct.spends, direct.stages = [8, 0, 0, 5], [(0.7, 0.2), (0.7, 0.1), (0.7, 0.1)]
     assert direct.ends(40) == 8
-    assert direct.log == [("run", 0.5), "raised", ("run", 0.7)]
-    direct.spends, direct.stages = [8, 8, 5], [0.7, 0.8]
+    assert direct.log == [("run", 0.5), *["raised", ("run", 0.7)] * 2, "raised"]
+    direct.spends, direct.stages = [8, 8, 5], [(0.7, 0.2), (0.8, 0.2)]
     assert direct.ends(16) == 16
     direct.log.clear()
     direct.stage, direct.spends = 1.0, [8, 8]
