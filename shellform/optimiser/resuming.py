@@ -46,6 +46,7 @@ def tell(search: Search, it: Iterate) -> None:
     numbers["radius"], numbers["mind"] = design.radius, {}
     if it.mind is not None and it.remembered is not None:
         numbers["mind"] = {str(each.number): each.least for each in it.mind.scenarios}
+        numbers["followed to"] = it.mind.most
         numbers["remembered radius"] = it.remembered.radius
         arrays["remembered rest_length"] = it.remembered.rest_length
         arrays["remembered present"] = it.remembered.present
@@ -66,7 +67,7 @@ def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
             numbers["remembered radius"],
         )
         least = {int(number): factor for number, factor in numbers["mind"].items()}
-        mind = kept_in_mind(search, remembered, least)
+        mind = kept_in_mind(search, remembered, least, numbers.get("followed to"))
     search.evaluator.problem = aimed(search.inner, numbers["stiffness"], mind)
     states = {
         name: State(arrays[f"{name} positions"], arrays[f"{name} quaternions"], arrays.get(f"{name} tail"))

@@ -253,9 +253,12 @@ def restiffened(search: Search, it: Iterate, least: float) -> Iterate:
     return replace(it, stiffness=least, point=point, excess=excess, window=search.first_window)
 
 
-def kept_in_mind(search: Search, design: Design, least: Mapping[int, float]) -> FactorsAsBuilt:
+def kept_in_mind(
+    search: Search, design: Design, least: Mapping[int, float], most: float | None = None
+) -> FactorsAsBuilt:
     """The structures of the numbers in `least`, drawn as trials draw them, as scenarios of the search with
-    the factors of the largest load that they are to bear, remembered in the design. Raises NotConverged."""
+    the factors of the largest load that they are to bear, remembered in the design; none is followed beyond
+    the factor `most` (None: somewhat beyond the largest of these). Raises NotConverged."""
     assert search.asked is not None
     problem, asked, safety = search.problem, search.asked.trial, search.asked.trial.safety
     decisive, _ = largest_on_path(asked)
@@ -266,7 +269,7 @@ def kept_in_mind(search: Search, design: Design, least: Mapping[int, float]) -> 
         asked.tolerances,
         seed=safety.seed + SEED,
         least=least,
-        most=_FOLLOWED * max(least.values()),
+        most=_FOLLOWED * max(least.values()) if most is None else most,
         exact=_NEARLY,
     )
     return remembered_in(problem.shell, design, drawn)

@@ -144,6 +144,18 @@ def test_a_search_resumed_while_it_is_led_knows_the_same_structures_and_point(se
     assert (again.phase, again.led_to, again.until, again.stood) == ("lead", np.inf, led.until, led.stood)
 
 
+def test_a_search_resumed_with_structures_that_are_to_bear_what_they_do_follows_them_as_far_as_before(
+    searching,
+):
+    search, it, kept = searching
+    led = minding.as_borne(search, it, {0: 1.03, 1: 1.03 * 50.0})
+    tell(search, led)
+    numbers = json.loads(json.dumps(kept[-1].numbers))
+    _, again = resumed(search, Checkpoint(numbers, kept[-1].arrays, kept[-1].history))
+    assert again.mind.most == led.mind.most
+    np.testing.assert_array_equal(again.point.constraints, led.point.constraints)
+
+
 def test_where_structures_lead_to_no_design_that_stands_the_search_goes_back_to_what_stood(
     searching, monkeypatch
 ):

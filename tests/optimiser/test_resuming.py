@@ -39,8 +39,8 @@ def search(monkeypatch):
     )
     told = SimpleNamespace(kept=[], minds=[], aimed=[])
 
-    def kept_in_mind(search, design, least):
-        told.minds.append((design, least))
+    def kept_in_mind(search, design, least, most):
+        told.minds.append((design, least, most))
         return mind_of(least)
 
     def aimed(inner, stiffness, mind):
@@ -128,7 +128,8 @@ def test_where_a_search_stands_comes_back_with_all_that_it_knows(search, mind):
         assert (found.mind, found.remembered, own, told.minds) == (None, None, None, [])
         return
     assert same(found.remembered, elsewhere)
-    ((where, least),) = told.minds
+    ((where, least, most),) = told.minds
+    assert most == it.mind.most
     assert same(where, elsewhere)
     assert list(least.items()) == list(mind.items()), "in their order"
     assert found.mind == own
