@@ -130,11 +130,22 @@ def read_model(path: str | Path) -> Model:
 
 
 def parse_model(data: object) -> Model:
-    """The model in a parsed JSON document. Raises InputError naming the field and the element."""
+    """The model in a parsed JSON document, in which NumPy's numbers and arrays may stand. Raises InputError
+    naming the field and the element."""
     try:
-        return _model(msgspec.convert(data, _ModelFile))
+        return _model(msgspec.convert(msgspec.to_builtins(data, enc_hook=_plain), _ModelFile))
     except msgspec.ValidationError as error:
         raise refusal(error, _PARTS) from error
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise InputError(
+        f"holds a {type(value).__name__}",
+        where="model",
+        remedy="Give numbers, texts, lists and dictionaries.",
+    )
 
 
 def write_model(path: str | Path, model: Model) -> None:

@@ -100,14 +100,15 @@ def connected(count: int, ends: Indices) -> tuple[int, Indices]:
 def doubts(network: Network) -> list[str]:
     """What is allowed but rarely meant, a sentence each: nodes in one place, elements side by side,
     stiffnesses too far apart, rest lengths far from the distance of their nodes, nodes in millimetres,
-    straight rods that nothing keeps from spinning about their own axis (that spin is held in the
-    solution)."""
+    displacements imposed on what isn't fixed, straight rods that nothing keeps from spinning about their own
+    axis (that spin is held in the solution)."""
     return [
         *_coincident(network),
         *_side_by_side(network),
         *_far_apart(network),
         *_misfitting(network),
         *_in_millimetres(network),
+        *_unheld(network),
         *_free_to_spin(network),
     ]
 
@@ -169,6 +170,15 @@ def _in_millimetres(network: Network) -> list[str]:
     return [
         f"The nodes reach over {number(side, 4)} m, and beams are {number(slender, 2)} times as long as EA and EI make them thick: if "
         f"millimetres were meant, write metres, {number(1e-3 * side, 4)} in place of {number(side, 4)}."
+    ]
+
+
+def _unheld(network: Network) -> list[str]:
+    lost = ((network.imposed != 0.0) & ~network.fixed).any(axis=1)
+    if not lost.any():
+        return []
+    return [
+        f"Displacements are imposed on what isn't fixed, at nodes[{int(np.argmax(lost))}] the first: they count for nothing there."
     ]
 
 

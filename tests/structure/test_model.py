@@ -87,6 +87,19 @@ def test_a_file_that_is_no_model_is_refused_by_name(tmp_path, text):
         read_model(file)
 
 
+def test_numpy_s_numbers_and_arrays_make_a_model_as_lists_do_and_other_things_none():
+    model = bow()
+    model["nodes"] = np.array(model["nodes"])
+    model["beams"] = [
+        {**each, "EA": np.float64(each["EA"]), "nodes": np.array(each["nodes"])} for each in model["beams"]
+    ]
+    given, expected = parse_model(model).network, parse_model(bow()).network
+    assert given.nodes.tolist() == expected.nodes.tolist()
+    assert given.beams.axial.tolist() == expected.beams.axial.tolist()
+    with pytest.raises(InputError, match="model: holds a object"):
+        parse_model({**bow(), "nodes": object()})
+
+
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="can't be read"):
         read_model(tmp_path / "nowhere.json")

@@ -125,6 +125,16 @@ def test_a_million_of_millions_between_stiffnesses_is_too_much_and_what_adds_not
     assert doubts(network(nodes[:1])) == []
 
 
+def test_displacements_of_what_is_not_fixed_are_told_to_count_for_nothing():
+    both = network([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [[0, 1]])
+    fixed, imposed = np.zeros((2, 6), dtype=bool), np.zeros((2, 6))
+    fixed[1, :2], imposed[1, :2] = True, 0.01
+    held = replace(both, fixed=fixed, imposed=imposed)
+    assert not [each for each in doubts(held) if "imposed" in each]
+    (told,) = [each for each in doubts(replace(held, fixed=fixed & (np.arange(6) < 1))) if "imposed" in each]
+    assert "nodes[1] the first" in told
+
+
 @pytest.mark.parametrize(
     ("rest", "told"),
     [
