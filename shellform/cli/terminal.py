@@ -113,6 +113,7 @@ def tell_as_built(summary: Summary) -> None:
         critical_words,
         fallen_at,
         goes_slack_words,
+        raising_words,
         rare_words,
         shape_notes,
         standing_words,
@@ -136,7 +137,9 @@ def tell_as_built(summary: Summary) -> None:
     if summary.verdict is not None:
         name = summary.verdict.design
         limit = None if summary.optimisation is None else summary.optimisation.cable_force_limit
-        for note in (*shape_notes(summary, name), before_load_words(summary.designs, name, limit)):
+        before = summary.designs[name].loads.get("none") if name in summary.designs else None
+        pulled = before_load_words(summary.designs, name, limit)
+        for note in (*shape_notes(summary, name), pulled, raising_words(before)):
             if note:
                 print(f"{note}.")
     found = summary.failure

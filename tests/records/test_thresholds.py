@@ -23,6 +23,7 @@ from shellform.records.words import (
     critical_words,
     far_off_words,
     load_title,
+    raising_words,
     spent_words,
     standing_words,
 )
@@ -94,6 +95,14 @@ def test_a_design_stands_where_it_is_stable_and_did_not_snap_through(
 def test_rods_that_would_bear_the_load_are_thicker_by_the_root_of_what_lacks(shell, designs):
     cell = found(shell, designs, "design", stable=False, critical_factor=0.64)["Stands under the design load"]
     assert "at least 1.3 mm radius (rod.radius = 0.0013)" in cell.remedy  # 1 mm / 0.8 = 1.25 mm
+
+
+def test_rods_near_their_strength_before_any_load_are_told_to_bear_more_on_the_way_up():
+    row = load("none", rod_utilisation_max=0.85, stress_utilisation_max=0.91)
+    assert raising_words(row).startswith("Rods are at 91 % of their strength before any load")
+    assert raising_words(replace(row, stress_utilisation_max=0.9)) == ""
+    assert raising_words(replace(row, on_branch=False)) == ""
+    assert raising_words(None) == ""
 
 
 def test_rods_break_by_what_axial_force_adds_to_their_bending_too(shell, designs):

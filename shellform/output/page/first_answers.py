@@ -26,6 +26,7 @@ from shellform.records.words import (
     driven_words,
     listed,
     load_title,
+    raising_words,
     shape_notes,
     standing_count_words,
 )
@@ -88,12 +89,13 @@ def answers(
         if main is None or not math.isfinite(shell.rod.strength)
         else f"; at {100 * main.stressed:.0f} % of their strength"
     )
+    raised = raising_words(before)
     locked = "" if layers_of(section) == 1 else "; bent lath by lath, then locked by shear blocks"
     found.append(
         Answer(
             "Which rods?",
             label(section, 2),
-            f"{len(rods)} rods of up to {number(1e3 * float(rods.max()))} mm{stressed}{locked}{bought}",
+            f"{len(rods)} rods of up to {number(1e3 * float(rods.max()))} mm{stressed}{locked}{bought}{f'. {raised}' if raised else ''}",
         )
     )
     if more is not None:
