@@ -164,6 +164,12 @@ def read_toml(file: Path) -> dict[str, Any]:
 
 def make_case(data: Mapping[str, Any], file: Path) -> Case:
     """As `load_case`, from the tables of a file that are read already."""
+    if "surface" not in data and isinstance(data.get("case"), str):
+        raise InputError(
+            f"is a study of the case {data['case']}, no case",
+            where=str(file),
+            remedy=f"Run it by shellform study, or name {data['case']} itself.",
+        )
     try:
         case = Case.model_validate(with_joint(with_present_names(data), file))
     except ValidationError as error:

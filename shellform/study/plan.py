@@ -185,8 +185,15 @@ class Plan:
 def read_study(path: str | Path) -> Plan:
     """The plan in a study file. Raises InputError naming every entry that is wrong."""
     file = Path(path)
+    entries = read_toml(file)
+    if "case" not in entries and isinstance(entries.get("surface"), dict):
+        raise InputError(
+            "is a case, no study",
+            where=str(file),
+            remedy=f'Run it by shellform design, or write a study with case = "{file.name}" and what is to [vary].',
+        )
     try:
-        study = Study.model_validate(read_toml(file))
+        study = Study.model_validate(entries)
     except ValidationError as error:
         raise refusal(error, Study, str(file)) from error
     return make_plan(study, file)

@@ -89,6 +89,11 @@ def test_wrong_entries_are_named_with_a_remedy(tmp_path, old, new, said):
         load_case(write(tmp_path, GOOD.replace(old, new, 1)))
 
 
+def test_a_study_given_for_a_case_is_said_to_be_one():
+    with pytest.raises(InputError, match=r"is a study of the case scale_model\.toml.*shellform study"):
+        load_case(ROOT / "scripts/study_weights.toml")
+
+
 def test_missing_files_and_malformed_settings_are_refused(tmp_path):
     with pytest.raises(InputError, match="can't be read"):
         load_case(tmp_path / "none.toml")

@@ -10,9 +10,15 @@ from shellform.study import plan as plans
 from shellform.study.expressions import evaluate
 from shellform.study.outcome import OWN_COLUMNS
 from shellform.study.plan import Study, VaryEntry, changes, length, placed, ranged, read_study, resolved
+from tests.command import ROOT
 from tests.stubs import CASE, study_file
 
 ENTRIES = {"net.spacing": 0.055, "rod.radius": 1e-3}
+
+
+def test_a_case_given_for_a_study_is_said_to_be_one():
+    with pytest.raises(InputError, match=r'is a case, no study.*shellform design.*case = "vault\.toml"'):
+        read_study(ROOT / "scripts/vault.toml")
 
 
 def worth(text):
