@@ -21,10 +21,10 @@ def erect(
         ),
     ] = None,
     props: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
-            help="What the scaffold props: CSV file of node or crossing; left out: every second "
-            "crossing, but where it is steep."
+            help='What the scaffold props: "every" crossing, or a CSV file of node or crossing; left out: every '
+            "second crossing, but where it is steep."
         ),
     ] = None,
     tighten_first: Annotated[

@@ -9,6 +9,8 @@ from shellform.run.folder import Run
 from shellform.site.erection_steps import Props
 from shellform.structure.elements.state import State
 
+EVERY = "every"  # crossing is propped, as it is asked for
+
 
 def off_design(run: Run, design: str, load: str, state: State) -> list[str]:
     """How far a shell that was erected ends from where its design lies; nothing of a load that the run
@@ -21,9 +23,13 @@ def off_design(run: Run, design: str, load: str, state: State) -> list[str]:
     return [f"in the end it lies up to {number(1e3 * far, 2)} mm from where the design does {under}"]
 
 
-def broken_told(stage: str, borne: Props | None, tighten_first: bool) -> str:
-    """That rods break, most of all in a `stage`, and what helps: another way up only on the way up."""
-    when, helps = "on the way", "prop other crossings (--props)"
+def broken_told(stage: str, borne: Props | None, tighten_first: bool, every: bool) -> str:
+    """That rods break, most of all in a `stage`, and what helps: another way up only on the way up, and more
+    props only where not `every` crossing has one."""
+    when, helps = (
+        "on the way",
+        "prop other crossings (--props)" if every else "prop every crossing (--props every)",
+    )
     if stage == "loading":
         when, helps = "under the load", "give a smaller --load"
     elif stage.startswith("tightening"):

@@ -25,7 +25,7 @@ from shellform.errors import (
 )
 from shellform.gridshell.gridshell import Gridshell
 from shellform.quantities import PLACE_DEVIATION, TURN, newtons
-from shellform.run.erection_told import broken_told, off_design, scaffold_told
+from shellform.run.erection_told import EVERY, broken_told, off_design, scaffold_told
 from shellform.run.folder import Run, read_run
 from shellform.run.site_sources import design_named, load_named, scan_under, scanned
 from shellform.site import calibration, erection, measurements, retensioning
@@ -217,7 +217,7 @@ def erect(
     *,
     design: str | None = None,
     by: str | None = None,
-    props: Path | None = None,
+    props: str | None = None,
     tighten_first: bool = False,
     load: str | None = None,
     weight: str | None = None,
@@ -227,8 +227,9 @@ def erect(
     step: float = erection.STEP,
     output: Path | None = None,
 ) -> SiteResult:
-    """From the flat grid to the erected, tightened and loaded shell. Writes erection.csv, a line a step, and
-    erection.npz with the shapes. Raises InputError, NotConverged.
+    """From the flat grid to the erected, tightened and loaded shell. `props`: EVERY crossing, or a file that
+    names them. Writes erection.csv, a line a step, and erection.npz with the shapes. Raises InputError,
+    NotConverged.
     """
     run = read_run(folder)
     name = design_named(run, design, run.best)
@@ -240,7 +241,7 @@ def erect(
         shell,
         run.designs[name],
         by=by,
-        props=None if props is None else measurements.read_nodes(props, shell),
+        props=_propped(props, shell),
         tighten_first=tighten_first,
         way=stops,
         groups=None if groups is None else measurements.read_groups(groups, run.designs[name]),
@@ -270,10 +271,21 @@ def erect(
             f"support {newtons(max(each.reaction for each in done.steps))}",
             *([] if borne is None else [scaffold_told(borne)]),
             *([] if weight else off_design(run, name, load or "none", last.state)),
-            *([broken_told(worst.stage, borne, tighten_first)] if worst.stress > done.strength else []),
+            *(
+                [broken_told(worst.stage, borne, tighten_first, props == EVERY)]
+                if worst.stress > done.strength
+                else []
+            ),
         ],
         files,
     )
+
+
+def _propped(props: str | None, shell: Gridshell) -> Indices | None:
+    """The nodes that a scaffold props (None: the usual ones)."""
+    if props == EVERY:
+        return shell.net.grid.crossing_nodes[:, 0]
+    return None if props is None else measurements.read_nodes(Path(props), shell)
 
 
 def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.Belief]:

@@ -160,8 +160,10 @@ def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, 
         "the scaffold pushes crossings up with up to 9\u202f570 N each and holds up to 108 of them down, where the grid would "
         "lift off, with up to 1\u202f086 N; ropes draw rods' ends in with up to 240 N",
         "in the end it lies up to 20 mm from where the design does under the load “wet”",
-        "rods break on the way: prop other crossings (--props), or choose thinner or stronger rods",
+        "rods break on the way: prop every crossing (--props every), or choose thinner or stronger rods",
     ]
+    every = onsite.erect(tmp_path, load="wet", lift="none", step=0.125, props="every")
+    assert every.lines[-1].startswith("rods break on the way: prop other crossings (--props), or")
     for stage, first, told in [
         ("loading", True, "under the load: give a smaller --load"),
         ("tightening group 2", True, "as cables are tightened: leave --tighten-first out"),
