@@ -1,6 +1,5 @@
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -44,13 +43,11 @@ def begun(monkeypatch):
 
 def test_loops_that_no_cache_holds_are_compiled_by_a_process_that_ends_with_the_block(begun, monkeypatch):
     monkeypatch.setattr(ahead, "is_kept", lambda function: False)
-    began = time.monotonic()
     with ahead.compiling_ahead():
         ((command, process),) = begun
         assert command[-2] == "shellform.structure.ahead"
         assert process.poll() is None
-    assert process.poll() is not None
-    assert time.monotonic() - began < 30.0
+    assert process.poll() not in (None, 0), "it would have gone on for a minute"
 
 
 def test_nothing_is_compiled_ahead_where_it_is_kept_or_where_one_core_would_do_both(begun, monkeypatch):
