@@ -284,6 +284,7 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
         CASE,
         [
             *LIMITS,
+            "net.elements=2",
             "optimise.evaluations=5",
             "optimise.polish=0",
             "tolerances.cable_stiffness=0",
