@@ -12,7 +12,7 @@ import contextlib
 import errno
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,19 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def refuse_overwriting(files: Iterable[Path], read: Iterable[Path | None]) -> None:
+    """Raises InputError where one of the `files` that are to be written is one that is `read`, by whatever
+    name."""
+    known = [each for each in read if each is not None and each.exists()]
+    for file in files:
+        if file.exists() and any(map(file.samefile, known)):
+            raise InputError(
+                "is read and would be overwritten",
+                where=str(file),
+                remedy="Give it another name, and name that, or choose another --output.",
+            )
 
 
 def is_partial(file: Path) -> bool:

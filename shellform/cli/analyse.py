@@ -52,8 +52,11 @@ def analyse(
     from shellform.structure.answers.results import read_sections
     from shellform.structure.model import read_model
     from shellform.structure.solve.memory import limited_to_free_memory
+    from shellform.written import refuse_overwriting, write_text
 
-    _refuse_overwriting(output, model, sections)
+    if output is not None and output.is_dir():
+        raise InputError("is a folder, no file", where=str(output), remedy="Name a file in it.")
+    refuse_overwriting([] if output is None else [output], (model, sections))
     report = Spinner()
     try:
         known = read_sections(sections) if sections is not None else None
@@ -82,8 +85,6 @@ def analyse(
     if output is None:
         print(text)
     else:
-        from shellform.written import write_text
-
         write_text(output, text)
     if figures is not None:
         from shellform.output.pictures.model_states import draw_analysis
@@ -92,18 +93,6 @@ def analyse(
             print(file, file=sys.stderr)
     if analysis.message:
         raise NotConverged(analysis.message)
-
-
-def _refuse_overwriting(output: Path | None, *read: Path | None) -> None:
-    """Raises InputError for a result that would take the place of what is `read`, or of a folder."""
-    if output is None:
-        return
-    if output.is_dir():
-        raise InputError("is a folder, no file", where=str(output), remedy="Name a file in it.")
-    if output.exists() and any(each is not None and each.exists() and output.samefile(each) for each in read):
-        raise InputError(
-            "is read and would be overwritten", where=str(output), remedy="Choose another --output."
-        )
 
 
 def _lead(text: str) -> tuple[int, int, float]:

@@ -38,13 +38,20 @@ from shellform.arrays import Indices, Reals, Record
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.convex import minimise
-from shellform.optimiser.optimum import Checkpoint, Optimum, Step, largest, terms_by_name
+from shellform.optimiser.optimum import (
+    Checkpoint,
+    Optimum,
+    Step,
+    arrays_of,
+    largest,
+    states_of,
+    terms_by_name,
+)
 from shellform.optimiser.solver import check_settings
 from shellform.optimiser.trials import reach, staged
 from shellform.problem.evaluation import COUNTS, Evaluated, Evaluator, Linearisation, OffBranch
 from shellform.problem.paths import follow, without_slack
 from shellform.problem.problem import Problem
-from shellform.structure.elements.state import State
 from shellform.work_clock import Work, counts_as
 
 _NUMBERS = ("stage", "margin", "until", "caution")
@@ -190,7 +197,8 @@ def _begun(
     evaluator = Evaluator(problem, start)
     reached = evaluator.begin()
     search = _Search(problem, solver, evaluator, evaluations, progress, keep, began, margin=solver.margin)
-    used, state = problem.used(), reached[search.base].equilibrium.state
+    used = problem.used()
+    state = reached[search.base].equilibrium.state
     if all(reached[name].on_branch for name in used):
         states = {name: reached[name].equilibrium.state for name in used}
     else:
@@ -322,10 +330,7 @@ def _tell(search: _Search) -> None:
     }
     for k, point in enumerate(search.near):
         arrays[f"{k} rest_length"] = point.design.rest_length
-        for name, state in point.states.items():
-            arrays |= {f"{k} {name} positions": state.positions, f"{k} {name} quaternions": state.quaternions}
-            if state.tail is not None:
-                arrays[f"{k} {name} tail"] = state.tail
+        arrays |= arrays_of(point.states, f"{k} ")
     search.keep(Checkpoint(numbers, arrays, tuple(search.history)))
 
 
@@ -339,14 +344,7 @@ def _resume(search: _Search, checkpoint: Checkpoint) -> None:
     present, used = search.best.design.present, search.problem.used()
     search.near = []
     for k, radius in enumerate(numbers["radii"]):
-        states = {
-            name: State(
-                arrays[f"{k} {name} positions"],
-                arrays[f"{k} {name} quaternions"],
-                arrays.get(f"{k} {name} tail"),
-            )
-            for name in used
-        }
+        states = states_of(arrays, used, f"{k} ")
         design = Design(arrays[f"{k} rest_length"], present, radius)
         search.near.append(evaluator.linearised(evaluator.seed(design, states, search.stage)))
     search.accepted = [

@@ -60,6 +60,31 @@ class Checkpoint(Record):
             )
 
 
+def arrays_of(states: Mapping[str, State], prefix: str = "") -> dict[str, np.ndarray]:
+    """The states by load case as a checkpoint has them, to their last digit; `prefix` begins each name."""
+    found: dict[str, np.ndarray] = {}
+    for name, state in states.items():
+        found |= {
+            f"{prefix}{name} positions": state.positions,
+            f"{prefix}{name} quaternions": state.quaternions,
+        }
+        if state.tail is not None:
+            found[f"{prefix}{name} tail"] = state.tail
+    return found
+
+
+def states_of(arrays: Mapping[str, np.ndarray], names: Iterable[str], prefix: str = "") -> dict[str, State]:
+    """The states of these load cases from what `arrays_of` made of them."""
+    return {
+        name: State(
+            arrays[f"{prefix}{name} positions"],
+            arrays[f"{prefix}{name} quaternions"],
+            arrays.get(f"{prefix}{name} tail"),
+        )
+        for name in names
+    }
+
+
 @dataclass(frozen=True, eq=False)
 class Optimum:
     """What an optimisation found.

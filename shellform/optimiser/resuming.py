@@ -9,10 +9,9 @@ from dataclasses import fields, replace
 import numpy as np
 
 from shellform.gridshell.gridshell import Design
-from shellform.optimiser.optimum import Checkpoint
+from shellform.optimiser.optimum import Checkpoint, arrays_of, states_of
 from shellform.optimiser.search_state import Accepted, Iterate, Search, aimed, kept_in_mind
 from shellform.problem.evaluation import COUNTS
-from shellform.structure.elements.state import State
 
 _ARRAYS = ("tensioned", "excess", "needed")
 _NUMBERS = tuple(
@@ -39,10 +38,7 @@ def tell(search: Search, it: Iterate) -> None:
         "accepted violation": np.array([each.violation for each in it.accepted]),
         "accepted objective": np.array([each.objective for each in it.accepted]),
     }
-    for name, state in it.point.states.items():
-        arrays |= {f"{name} positions": state.positions, f"{name} quaternions": state.quaternions}
-        if state.tail is not None:
-            arrays[f"{name} tail"] = state.tail
+    arrays |= arrays_of(it.point.states)
     numbers["radius"], numbers["mind"] = design.radius, {}
     if it.mind is not None and it.remembered is not None:
         numbers["mind"] = {str(each.number): each.least for each in it.mind.scenarios}
@@ -69,10 +65,7 @@ def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
         least = {int(number): factor for number, factor in numbers["mind"].items()}
         mind = kept_in_mind(search, remembered, least, numbers.get("followed to"))
     search.evaluator.problem = aimed(search.inner, numbers["stiffness"], mind)
-    states = {
-        name: State(arrays[f"{name} positions"], arrays[f"{name} quaternions"], arrays.get(f"{name} tail"))
-        for name in search.evaluator.problem.used()
-    }
+    states = states_of(arrays, search.evaluator.problem.used())
     point = search.evaluator.seed(design, states, numbers["stage"])
     for name in COUNTS:
         setattr(search.evaluator, name, numbers[name])

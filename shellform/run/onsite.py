@@ -33,7 +33,7 @@ from shellform.site.scans import counted_alike
 from shellform.site.surveys import doubtful, read_survey
 from shellform.structure.elements.state import State
 from shellform.tables import Table, table_text
-from shellform.written import make_folder, write_arrays, write_text
+from shellform.written import make_folder, refuse_overwriting, write_arrays, write_text
 
 # times the noise: of the hundreds of coordinates of a scan their deviation is told to a few percent
 _ABOVE = 1.5
@@ -123,7 +123,7 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     round_ = 1 if options.after is None else 1 + int(read_arrays(options.after).get("round", np.array(1)))
     where = make_folder(output or run.folder / "schedules")
     files = [where / each for each in ("turns.csv", "predicted.csv", f"belief-{round_}.npz")]
-    _refuse_overwriting(files, (measured, options.after))
+    refuse_overwriting(files, (measured, options.after))  # told again, the round would be another
     goal = run.states[name][options.load].positions
     origin = run.case.surface.origin
     seen = read_survey(measured, shell, belief.state, unit=options.unit, origin=origin)
@@ -342,18 +342,6 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
 def _marked(markers: Path | None, shell: Gridshell) -> Indices:
     """The nodes (m,) that a file names, or of all crossings the upper rod's."""
     return shell.net.grid.crossing_nodes[:, 1] if markers is None else measurements.read_nodes(markers, shell)
-
-
-def _refuse_overwriting(files: Sequence[Path], read: Sequence[Path | None]) -> None:
-    """Raises InputError where what is read would be overwritten: told again, the round would be another."""
-    there = [file for file in files if file.exists()]
-    for each in read:
-        if each is not None and each.exists() and any(map(each.samefile, there)):
-            raise InputError(
-                "is read and would be overwritten",
-                where=str(each),
-                remedy="Give it another name, and name that, or choose another --output.",
-            )
 
 
 def _predicted(shell: Gridshell, before: State, step: retensioning.Adjustment, goal: Reals) -> str:
