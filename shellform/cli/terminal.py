@@ -137,9 +137,10 @@ def tell_as_built(summary: Summary) -> None:
     if summary.verdict is not None:
         name = summary.verdict.design
         limit = None if summary.optimisation is None else summary.optimisation.cable_force_limit
-        before = summary.designs[name].loads.get("none") if name in summary.designs else None
         pulled = before_load_words(summary.designs, name, limit)
-        for note in (*shape_notes(summary, name), pulled, raising_words(before)):
+        ways = summary.designs[name].ways_up if name in summary.designs else None
+        raised = raising_words(ways) if ways else ""
+        for note in (*shape_notes(summary, name), pulled, raised):
             if note:
                 print(f"{note}.")
     found = summary.failure

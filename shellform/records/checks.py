@@ -19,9 +19,10 @@ from shellform.records.as_built import critical_checks, guide_checks, standing_c
 from shellform.records.check import SLACK, UNASKED, Cell, Check, Subject, below, on_worse_mesh, share_of
 from shellform.records.limited import Bounds, limited
 from shellform.records.optimisation import OptimisationRecord
+from shellform.records.raising import easiest
 from shellform.records.remedies import RodsOf, allow, allow_count
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
-from shellform.records.words import constraint_titles, load_title
+from shellform.records.words import borne_words, constraint_titles, load_title
 
 BUILT = ("optimised", "rounded", "polished")  # in the order in which they are made
 # Unbalanced over largest force: what an equilibrium that counts as found stays below.
@@ -89,6 +90,7 @@ def checks(
             loads,
         ),
         *_of_edge_beams(judged),
+        *_raised(judged, required=bounds.safety is not None and bounds.safety.required),
         Check("Rods bent into the shape (1)", "up to 100 % of the curvature they bear", bent),
         *limited(rows, rods, bounds),
         *_deviating(judged, bounds),
@@ -111,6 +113,25 @@ def _of_edge_beams(judged: _Judged) -> list[Check]:
     return judged.under(
         "Edge beams", limit, _if_standing(lambda row, rods: _edged(row)), list(judged.factors)
     )
+
+
+def _raised(judged: _Judged, *, required: bool) -> list[Check]:
+    """What rods bear as the grid goes up, required where its standing as built is."""
+    cells = {name: _going_up(judged, name, required) for name in judged.designs}
+    limit = "stress up to 100 % of the strength" if required else "told only"
+    return [Check("Rods on the way up", limit, cells)] if set(cells.values()) != {UNASKED} else []
+
+
+def _going_up(judged: _Judged, name: str, required: bool) -> Cell:
+    row = judged.rows.get(name)
+    if row is None or not row.ways_up:
+        return UNASKED
+    way = easiest(row.ways_up)
+    if way.utilisation is None:
+        return Cell(borne_words(way), None, required)
+    there = row.loads["none"].stressed if "none" in row.loads else way.utilisation
+    cell = share_of(way.utilisation, judged.rods[name].reserved(there, way.utilisation))
+    return replace(cell, found=borne_words(way), asked=required)
 
 
 def _deviating(judged: _Judged, bounds: Bounds) -> list[Check]:

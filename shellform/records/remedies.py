@@ -125,6 +125,13 @@ class RodsOf:
             times = (most - axial / times**2) / bending if times > _LEAST and bending > 0.0 else 0.0
         return self.thinner(times) if times > _LEAST else self._closer()
 
+    def reserved(self, bent: float, raised: float) -> str:
+        """To keep their strength on the way up, on which they bear the share `raised` of it, and `bent` once
+        they are up."""
+        if self._sizes.free:
+            return f"Leave a reserve for it (limits.utilisation = {_down(min(bent, 1.0) / raised)})."
+        return self.thinner(1.0 / raised)
+
     @property
     def _sizes(self) -> RodSizes:
         return self.sizes or RodSizes({"rod.radius": self.radius}, self.radius)

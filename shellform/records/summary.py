@@ -16,6 +16,7 @@ from shellform.net.quality import NetNumbers
 from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.files import ANEW, plain, read_record, text_of
 from shellform.records.optimisation import OptimisationRecord, SectionRecord
+from shellform.records.raising import WayUpRecord
 from shellform.records.scattering import RobustRecord
 from shellform.records.stages import STAGES
 from shellform.records.thicker_rods import ThickerRodsRecord
@@ -201,7 +202,7 @@ class DesignRecord:
     """A design: how many `cables`, its `rod_radius`, m, their tensions under the design load
     (`cable_force_sum`, `cable_force_max`, N), and its `loads` by name. Of a rounded one the `section`,
     whether it is `feasible`, `why_not`, and its `objective`; where a critical factor was asked for,
-    `critical_factor_kept`."""
+    `critical_factor_kept`; of one to build the `ways_up` that were tried, the easiest first."""
 
     cables: int
     rod_radius: float
@@ -213,6 +214,7 @@ class DesignRecord:
     why_not: str | None = None
     objective: float | None = None
     critical_factor_kept: bool | None = None
+    ways_up: tuple[WayUpRecord, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -297,6 +299,7 @@ class Summary:
                 design,
                 loads={load: row.unexamined() for load, row in design.loads.items()},
                 critical_factor_kept=None,
+                ways_up=None,
             )
             for name, design in self.designs.items()
         }

@@ -7,11 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from shellform.quantities import newtons, number
 from shellform.records.failures import RareRecord
+from shellform.records.raising import SCAFFOLD, WayUpRecord, easiest
 from shellform.records.summary import BuiltShapeRecord, DesignRecord, LoadRecord, StandingRecord, Summary
 
-# of the rods' strength before any load: on the way up a vault's rods bear 1.02 times that on a scaffold, and
-# 1.10 to 1.13 times that where supports move in
-_RAISED = 0.9
 _SPENT = 1.25  # times the initial design's deviation as built, from which on it is worth a word
 LOADS = {"none": "no load", "design": "the design load", "additional": "the additional load"}
 TITLES = {
@@ -155,13 +153,29 @@ def before_load_words(designs: Mapping[str, DesignRecord], name: str, limit: flo
     return f"Before any load {', and '.join(found)}: schedules/cables.csv" if found else ""
 
 
-def raising_words(row: LoadRecord | None) -> str:
-    """That rods are stressed so much before any load that they may break while the grid is raised; "" where
-    they aren't, or where that isn't known."""
-    if row is None or row.collapsed or not row.stressed > _RAISED:
-        return ""
-    share = f"{100.0 * row.stressed:.0f} % of their strength before any load"
-    return f"Rods are at {share}, and at more on the way up: shellform erect tells whether they bear it"
+def way_up_words(way: WayUpRecord) -> str:
+    """What brings the grid up."""
+    if way.by != SCAFFOLD:
+        return "supports that move in"
+    return f"a scaffold under every {'' if way.every else 'second '}crossing"
+
+
+def borne_words(way: WayUpRecord, of: str = "") -> str:
+    """How much of their strength rods bear on the way up, said to be `of` that, or that there is none."""
+    if way.utilisation is None:
+        return f"no stable path by {way_up_words(way)}"
+    share = 100.0 * way.utilisation
+    digits = 3 if share <= 100.0 else 4  # 100.4 is too much
+    return f"{number(share, digits)} %{of} by {way_up_words(way)}"
+
+
+def raising_words(ways: Sequence[WayUpRecord]) -> str:
+    """How a design can be raised, what its rods bear then, and what they would bear otherwise."""
+    best = easiest(ways)
+    if best.utilisation is None:
+        return f"No stable path was found on which the grid goes up: {best.lost}"
+    others = "".join(f", {borne_words(each)}" for each in ways if each is not best)
+    return f"On the way up rods bear up to {borne_words(best, ' of their strength')}{others}"
 
 
 def above_words(row: LoadRecord | None, limit: float | None) -> str:

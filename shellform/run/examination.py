@@ -4,7 +4,8 @@ For every load case the critical factor of the perfect structure, on the design'
 halved, and how many of its structures as built stand. Load cases that are shares of a larger one lie on its
 path, and are judged on it. Designs to compare with are drawn a few times (`safety.compared`); of those that
 may be built, from the last one on, each that isn't known to fail is drawn in full until one holds. Of the one
-to build the most likely failure is told, and where it falls too often, which rods would stand (thicker.py).
+to build the most likely failure is told, where it falls too often, which rods would stand (thicker.py), and
+how it is raised (raised.py).
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ from shellform.run.figures import FAILURE
 from shellform.run.folder import Run, read_run
 from shellform.run.judged import asked_as_built, judged, run_checks
 from shellform.run.pace import time_words
+from shellform.run.raised import raised
 from shellform.run.rare_failures import rare_of
 from shellform.run.sampling import SHAPES, Clock, Examined, drawn_of
 from shellform.run.thicker import rods_that_stand
@@ -95,6 +97,7 @@ def examine(workspace: Workspace) -> Summary:
         best = leading
         if best != "unbraced":  # in full it may turn out worse than another one that was drawn a few times
             summary = _stand(workspace, _of_run(run, best), entry.drawn, summary, clock)
+            summary = _raised(workspace, _of_run(run, best), summary)
     chosen = _of_run(run, best)
     if best != "unbraced":
         summary = replace(summary, failure=_failure(workspace, chosen, entry.drawn))
@@ -114,6 +117,15 @@ def _bar(workspace: Workspace, initial: Examined, summary: Summary, clock: Clock
             clock.kept(len(paths(initial.loads)) * (entry.compared - entry.drawn))  # so many more to draw
             return _stand(workspace, initial, entry.drawn, summary, clock)
     return summary
+
+
+def _raised(workspace: Workspace, each: Examined, summary: Summary) -> Summary:
+    """With how a design can be raised."""
+    record = summary.designs[each.name]
+    if record.ways_up is not None:
+        return summary
+    workspace.say("safety", f"how the {each.name} design is raised", Kind.BEGAN)
+    return summary.with_design(each.name, replace(record, ways_up=raised(each.shell, each.design)))
 
 
 def _thicker(workspace: Workspace, run: Run) -> ThickerRodsRecord | None:

@@ -60,8 +60,8 @@ def erect(
 ) -> Erection:
     """The erection of the shell with the design's cables.
 
-    - `by`: what brings the grid up, "supports" that move in or a "scaffold" (scaffold.py); None: a scaffold
-      where there are edge beams or rods in two layers, else supports.
+    - `by`: what brings the grid up, "supports" that move in or a "scaffold" (scaffold.py); None: the
+      usual one (`usual_way_up`).
     - Of a scaffold, `props`: nodes of the crossings that it bears (None: every second one);
       `tighten_first`: the cables are tightened before it goes.
     - Of supports, `way`: their positions (s, 3), m, between the flat grid and the target, in the order of
@@ -113,6 +113,13 @@ def erect(
     return Erection(tuple(steps), shell.rod.strength)
 
 
+def usual_way_up(shell: Gridshell) -> str:
+    """What brings such a shell up: a scaffold where there are edge beams or rods in two layers, else
+    supports that move in."""
+    two = isinstance(shell.rod.section, TwoLayers)
+    return SCAFFOLD if len(shell.net.edges) or two else SUPPORTS
+
+
 def _loaded(site: Site, state: State, weight: Reals, load: Reals, step: float) -> list[ErectionStep]:
     """The load coming on."""
     steps = list[ErectionStep]()
@@ -135,9 +142,8 @@ def _way_up(shell: Gridshell, by: str | None, *, moving: Sequence[str], propped:
     """The way that the grid goes up, where what is given goes with supports that move (`moving`) or with a
     scaffold (`propped`). Raises InputError for what doesn't go with it."""
     edges = len(shell.net.edges)
-    layers = isinstance(shell.rod.section, TwoLayers) and not moving
-    usual = SCAFFOLD if edges or propped or layers else SUPPORTS
-    way = usual if by is None else by
+    usual = SUPPORTS if moving and not edges else usual_way_up(shell)
+    way = (SCAFFOLD if propped else usual) if by is None else by
     require_known(way, WAYS_UP, where="erect.by", what="is no way up")
     if way == SUPPORTS and edges:
         raise InputError(

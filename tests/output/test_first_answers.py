@@ -16,6 +16,7 @@ from shellform.output.page.measures import entry_measure, summary_measure
 from shellform.output.page.profile_table import profile_table
 from shellform.records.check import SLACK, Cell
 from shellform.records.profile import Profile, StageProfile, WorkRecord
+from shellform.records.raising import WayUpRecord
 from shellform.records.summary import LoadRecord, StandingRecord
 from shellform.records.words import standing_words
 from shellform.structure.elements.sections import Material, Rectangle
@@ -38,6 +39,38 @@ def test_a_shell_that_stands_as_built_is_safe_and_the_detail_tells_how_far_off_i
         "At least 92 % with 95 % confidence. As planned 12 mm off at most, 4.5 mm in the mean, rods at 62 % of their "
         "strength. At which load it collapses isn't known."
     )
+
+
+UP = WayUpRecord("scaffold", True, 0.9, "raising", 1234.0, 22.1, 13.0, 75)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words", "good"),
+    [
+        ({}, "By a scaffold under every crossing", True),
+        ({"every": False}, "By a scaffold under every second crossing", True),
+        ({"by": "supports"}, "By supports that move in", True),
+        ({"utilisation": 0.951}, "By a scaffold under every crossing", None),
+        ({"utilisation": 1.0 + 0.99 * SLACK}, "By a scaffold under every crossing", None),
+        ({"utilisation": 1.0 + 1.01 * SLACK}, "Rods break on the way up", False),
+        ({"utilisation": None, "lost": "It snaps"}, "No way was found", None),
+    ],
+)
+def test_how_a_shell_is_raised_is_told_with_what_it_takes(changed, words, good):
+    told = first_answers._is_raised((replace(UP, **changed),))
+    assert (told.words, told.good, told.open) == (words, good, good is None)
+
+
+def test_what_supports_and_a_scaffold_bear_as_it_is_raised_is_told_in_newtons():
+    told = first_answers._is_raised((UP,))
+    assert told.detail.endswith(
+        "of their strength by a scaffold under every crossing. On it supports bear up to 1\u202f234 N, each prop pushes with up "
+        "to 22.1 N, up to 75 crossings are held down with up to 13 N"
+    )
+    alone = first_answers._is_raised((replace(UP, held_down=0),))
+    assert alone.detail.endswith("each prop pushes with up to 22.1 N")
+    moved = first_answers._is_raised((WayUpRecord("supports", False, 0.9, "moving supports", 140.0),))
+    assert moved.detail.endswith("supports bear up to 140 N")
 
 
 def test_no_factor_is_told_of_an_additional_load_that_is_no_multiple_of_the_design_load():
@@ -63,7 +96,7 @@ def test_no_factor_is_told_of_an_additional_load_that_is_no_multiple_of_the_desi
 )  # fmt: skip
 def test_what_stands_worst_with_the_perfect_shell_is_told_first_and_then_the_drawn_ones(changed, words, good):
     told = safe(**changed)
-    assert (told.words, told.good) == (words, good)
+    assert (told.words, told.good, told.open) == (words, good, good is None)
 
 
 @pytest.mark.parametrize(("standing", "sure"), [(95, True), (94, False), (40, False), (100, True)])
@@ -225,7 +258,8 @@ def test_what_to_buy_is_told_in_metres_and_kilograms_of_both_laths(monkeypatch, 
                 loads={
                     "design": replace(MORE, stress_utilisation_max=0.7),
                     "none": replace(MORE, slack=(), cable_force_max=61.0),
-                }
+                },
+                ways_up=None,
             )
         },
         documents=SimpleNamespace(cut_lengths=2),
@@ -280,7 +314,9 @@ def test_nothing_is_told_of_a_design_that_was_not_examined_and_no_share_of_an_un
     assert "strength" not in which.detail
     assert "different lengths" not in buy.detail
     label = which.words
-    row = SimpleNamespace(designs={"best": SimpleNamespace(loads={"additional": MORE})}, documents=None)
+    row = SimpleNamespace(
+        designs={"best": SimpleNamespace(loads={"additional": MORE}, ways_up=None)}, documents=None
+    )
     many, which, safety, _ = answers(shell_of(lath, float("inf")), "best", design, {}, row, next_size=label)
     assert "next size" not in which.detail
     assert safety.question == "Is it safe at 1.5 × the load?"

@@ -12,6 +12,7 @@ from shellform.errors import Damaged, InputError
 from shellform.optimiser.optimum import Step, by_constraint
 from shellform.output.page.report import _charts
 from shellform.records.history import read_history, write_history
+from shellform.records.raising import WayUpRecord
 from shellform.records.scattering import SampleRecord
 from shellform.records.stages import StagesDone, read_stages, write_stages
 from shellform.records.summary import (
@@ -37,7 +38,11 @@ def changed(folder, change):
 def test_a_summary_is_read_back_as_it_was_written(tmp_path):
     stands = StandingRecord(200, 199, 0.972, 0.95, 0)
     row = load("design", critical_sought=3.0, critical_factor=1.4, critical_factor_error=0.01, stands=stands)
-    whole = summary(NAMES).with_design("polished", design(loads={"design": row}))
+    ways = (
+        WayUpRecord("supports", False, lost="It snaps"),
+        WayUpRecord("scaffold", True, 0.9, "raising", 1.0, 2.0, 3.0, 4),
+    )
+    whole = summary(NAMES).with_design("polished", design(loads={"design": row}, ways_up=ways))
     whole = replace(
         whole,
         verdict=VerdictRecord("polished", False, ("Rods",), ()),

@@ -12,6 +12,7 @@ from shellform.records.check import SLACK, Cell, Check, below, quantity, share_o
 from shellform.records.checks import checks
 from shellform.records.limited import Bounds
 from shellform.records.optimisation import CableCountRecord
+from shellform.records.raising import WayUpRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow
 from shellform.records.summary import BuiltShapeRecord, StandingRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
@@ -97,12 +98,55 @@ def test_rods_that_would_bear_the_load_are_thicker_by_the_root_of_what_lacks(she
     assert "at least 1.3 mm radius (rod.radius = 0.0013)" in cell.remedy  # 1 mm / 0.8 = 1.25 mm
 
 
-def test_rods_near_their_strength_before_any_load_are_told_to_bear_more_on_the_way_up():
-    row = load("none", rod_utilisation_max=0.85, stress_utilisation_max=0.91)
-    assert raising_words(row).startswith("Rods are at 91 % of their strength before any load")
-    assert raising_words(replace(row, stress_utilisation_max=0.9)) == ""
-    assert raising_words(replace(row, on_branch=False)) == ""
-    assert raising_words(None) == ""
+BY_SUPPORTS = WayUpRecord("supports", False, 1.084, "moving supports", 140.0)
+BY_SCAFFOLD = WayUpRecord("scaffold", True, 0.9961, "lowering", 78.7, 22.1, 13.0, 75)
+NO_WAY = WayUpRecord("scaffold", False, lost="It snaps")
+
+
+def test_what_rods_bear_on_the_way_up_is_told_of_the_easiest_way_and_of_those_that_break_them():
+    assert raising_words((BY_SUPPORTS, BY_SCAFFOLD)) == (
+        "On the way up rods bear up to 99.6 % of their strength by a scaffold under every crossing, 108.4 % by supports that "
+        "move in"
+    )
+    assert raising_words((NO_WAY, BY_SCAFFOLD)).endswith(
+        ", no stable path by a scaffold under every second crossing"
+    )
+    assert raising_words((BY_SUPPORTS, NO_WAY)).startswith(
+        "On the way up rods bear up to 108.4 % of their strength by supports"
+    )
+    assert raising_words((NO_WAY, NO_WAY)).endswith("the grid goes up: It snaps")
+
+
+@pytest.mark.parametrize(
+    ("share", "holds", "told"),
+    [(1.0009, True, "100.1 %"), (1.0011, False, "100.1 %"), (0.5, True, "50 %"), (1.004, False, "100.4 %")],
+)
+def test_rods_that_break_on_the_easiest_way_up_fail_where_standing_as_built_is_required(
+    shell, designs, share, holds, told
+):
+    ways = (replace(BY_SUPPORTS, utilisation=1.2), replace(BY_SCAFFOLD, utilisation=share))
+    asked = replace(BOUNDS, safety=AsBuilt(0.99, 0.99, 200))
+    cell = found(shell, designs, bounds=asked, ways_up=ways)["Rods on the way up"]
+    assert (cell.found, cell.holds, cell.asked) == (f"{told} by a scaffold under every crossing", holds, True)
+    only_told = replace(BOUNDS, safety=AsBuilt(0.99, 0.99, 200, required=False))
+    for bounds in (only_told, BOUNDS):
+        assert not found(shell, designs, bounds=bounds, ways_up=ways)["Rods on the way up"].asked
+    assert "Rods on the way up" not in found(shell, designs, bounds=asked)
+
+
+def test_a_design_of_which_no_way_up_was_found_is_left_open(shell, designs):
+    asked = replace(BOUNDS, safety=AsBuilt(0.99, 0.99, 200))
+    cell = found(shell, designs, bounds=asked, ways_up=(NO_WAY,))["Rods on the way up"]
+    assert (cell.found, cell.holds, cell.asked) == (
+        "no stable path by a scaffold under every second crossing", None, True
+    )  # fmt: skip
+
+
+def test_what_breaks_on_the_way_up_wants_thinner_rods_or_a_search_that_leaves_a_reserve():
+    assert RODS.reserved(0.98, 1.08) == "Take rods of at most 0.92 mm radius (rod.radius = 0.00092)."
+    free = replace(RODS, sizes=RodSizes({"rod.radius": 0.001}, 0.001, free=True, keeps=True))
+    assert free.reserved(0.98, 1.08) == "Leave a reserve for it (limits.utilisation = 0.9)."
+    assert free.reserved(1.0009, 1.25) == "Leave a reserve for it (limits.utilisation = 0.8)."
 
 
 def test_rods_break_by_what_axial_force_adds_to_their_bending_too(shell, designs):

@@ -433,7 +433,7 @@ def test_how_rarely_it_falls_is_told_of_every_load_that_weighs(monkeypatch, tmp_
 def test_designs_are_drawn_in_full_from_the_last_on_until_one_holds(
     monkeypatch, tmp_path, names, failing, open_ones, further, drawn, best
 ):
-    asked, clocks, compared = [], [], []
+    asked, clocks, compared, raised = [], [], [], []
 
     given = told(names)
     run = examination.Run(tmp_path, CASE, None, None, LOADS, dict.fromkeys(names), {}, given)
@@ -464,6 +464,7 @@ def test_designs_are_drawn_in_full_from_the_last_on_until_one_holds(
     monkeypatch.setattr(examination, "open_checks", lambda found, name: name in open_ones)
     monkeypatch.setattr(examination, "to_build", lambda found, every: best)
     monkeypatch.setattr(examination, "_failure", lambda desk, each, count: (each.name, count))
+    monkeypatch.setattr(examination, "_raised", lambda desk, each, so_far: raised.append(each.name) or so_far)
     monkeypatch.setattr(examination, "falls", lambda designs, name, safety: name == "optimised")
     monkeypatch.setattr(examination, "asked_as_built", lambda case: "asked")
     monkeypatch.setattr(examination, "_thicker", lambda desk, run: "thicker")
@@ -475,6 +476,7 @@ def test_designs_are_drawn_in_full_from_the_last_on_until_one_holds(
     assert compared == [name for name in names if name != "unbraced"]
     assert clocks[0] == 2 * (4 * len(compared) + 36), "of each design four on two paths, and 36 more of one"
     assert found.failure == (best, 40)
+    assert raised == [best]
     assert found.rare is None
     assert found.thicker == ("thicker" if best == "optimised" else None)
     assert found.verdict == "verdict"
@@ -511,6 +513,7 @@ def test_of_a_design_that_falls_behind_once_it_is_drawn_in_full_neither_verdict_
         examination, "to_build", lambda found, every: "optimised" if "polished" in asked else "polished"
     )
     monkeypatch.setattr(examination, "_failure", lambda desk, each, count: (each.name, count))
+    monkeypatch.setattr(examination, "raised", lambda shell, design: ("by",))
     monkeypatch.setattr(examination, "falls", lambda designs, name, safety: False)
     monkeypatch.setattr(examination, "asked_as_built", lambda case: "asked")
     monkeypatch.setattr(examination, "judged", lambda run: "verdict")
@@ -521,3 +524,6 @@ def test_of_a_design_that_falls_behind_once_it_is_drawn_in_full_neither_verdict_
     found = examination.examine(Desk(tmp_path, probability_additional=0.95))
     assert asked == ["polished", "optimised"]
     assert found.failure == ("optimised", 40)
+    assert {name: each.ways_up for name, each in found.designs.items()} == {
+        "initial": None, "optimised": ("by",), "polished": ("by",)
+    }, "the one that seemed to be the one to build, too"  # fmt: skip

@@ -1,5 +1,5 @@
 """The answers to what a designer asks first, of the design to build: how far off, how many cables, which
-rods, is it safe, what does it stand on, what to buy.
+rods, is it safe, how is it raised, what does it stand on, what to buy.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.quantities import newtons, number
 from shellform.records.check import SLACK, Cell
+from shellform.records.raising import WayUpRecord, easiest
 from shellform.records.summary import LoadRecord, Summary
 from shellform.records.words import (
     above_words,
@@ -29,6 +30,7 @@ from shellform.records.words import (
     raising_words,
     shape_notes,
     standing_count_words,
+    way_up_words,
 )
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
@@ -40,17 +42,19 @@ _EDGES = {
 
 
 _SAFE = 0.95  # of the structures as built: fewer may be what is asked for, and aren't safe
+_SPARED = 0.95  # of the rods' strength: more may be borne on the way up, and leaves nothing over
 
 
 @dataclass(frozen=True)
 class Answer:
     """What a designer asks first: the `question`, the answer in a few `words`, the `detail` that stands
-    behind it, and if it is `good` (None: neither)."""
+    behind it, and if it is `good` (None: neither), or `open`: not known well enough."""
 
     question: str
     words: str
     detail: str
     good: bool | None = None
+    open: bool = False
 
 
 def answers(
@@ -68,7 +72,8 @@ def answers(
     design to build, whose check `as_built` says how many drawn structures stand under the additional load;
     `next_size` is the size of the catalogue that its rods would be rounded to; `force_max`, N: what cables
     may pull under load."""
-    loads = summary.designs[name].loads if name in summary.designs else {}
+    own = summary.designs.get(name)
+    loads = {} if own is None else own.loads
     main, more, before = (loads.get(load) for load in ("design", "additional", "none"))
     found = [] if main is None else [_how_far(main, before, shape_notes(summary, name))]
     cables = shell.cables(design)
@@ -89,17 +94,18 @@ def answers(
         if main is None or not math.isfinite(shell.rod.strength)
         else f"; at {100 * main.stressed:.0f} % of their strength"
     )
-    raised = raising_words(before)
     locked = "" if layers_of(section) == 1 else "; bent lath by lath, then locked by shear blocks"
     found.append(
         Answer(
             "Which rods?",
             label(section, 2),
-            f"{len(rods)} rods of up to {number(1e3 * float(rods.max()))} mm{stressed}{locked}{bought}{f'. {raised}' if raised else ''}",
+            f"{len(rods)} rods of up to {number(1e3 * float(rods.max()))} mm{stressed}{locked}{bought}",
         )
     )
     if more is not None:
         found.append(_is_safe(main, more, as_built, math.isfinite(shell.rod.strength)))
+    if own is not None and own.ways_up:
+        found.append(_is_raised(own.ways_up))
     if shell.net.stretches:
         found.append(_stands_on(shell.net, more, loads))
     heavy, laths = mass_per_length(section) * float(rods.sum()), layers_of(section)
@@ -214,7 +220,29 @@ def _is_safe(
         words,
         f"{sure}As planned {off}. {_collapse(main)}",
         safe,
+        open=safe is None,
     )
+
+
+def _is_raised(ways: Sequence[WayUpRecord]) -> Answer:
+    """By which of the ways up that were tried, and what it takes."""
+    best = easiest(ways)
+    question, words = "How is it raised?", f"By {way_up_words(best)}"
+    if best.utilisation is None:
+        other = f"{raising_words(ways)}. shellform erect takes other ways and props"
+        return Answer(question, "No way was found", other, open=True)
+    needs = [] if best.reaction is None else [f"supports bear up to {newtons(best.reaction)}"]
+    if best.push is not None and best.pull is not None:
+        needs.append(f"each prop pushes with up to {newtons(best.push)}")
+        if best.held_down:
+            needs.append(
+                f"up to {how_many(best.held_down, 'crossing is', 'crossings are')} held down with up to {newtons(best.pull)}"
+            )
+    detail = ". ".join([raising_words(ways), f"On it {', '.join(needs)}"])
+    if best.utilisation > 1.0 + SLACK:
+        return Answer(question, "Rods break on the way up", detail, good=False)
+    spared = best.utilisation <= _SPARED
+    return Answer(question, words, detail, good=spared or None, open=not spared)
 
 
 def _collapse(row: LoadRecord | None) -> str:
