@@ -1,9 +1,9 @@
-"""How a design can be raised: the ways up that are usual for its kind of shell, the easiest first, until one
-is found on which its rods keep their strength.
+"""How a design can be raised: one way up after the other, until one is found on which its rods keep their
+strength.
 
 The first is the usual one (erection.py): supports that move in, or a scaffold under every second crossing
-where there are edge beams or rods in two layers. A scaffold under every crossing bends rods least: where on
-it they break too, other ways up don't help.
+where there are edge beams or rods in two layers. Then come scaffolds, under every crossing and under every
+second one: either may bend rods less than the other.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ class WayUp:
 def ways_up(shell: Gridshell, design: Design) -> list[WayUp]:
     """The ways up that were tried, of which the last one bears, if any does."""
     found = list[WayUp]()
-    for by, every in dict.fromkeys([(usual_way_up(shell), False), (SCAFFOLD, True)]):
+    usual = usual_way_up(shell)
+    for by, every in dict.fromkeys([(usual, False), (SCAFFOLD, True), (SCAFFOLD, False)]):
         props = shell.net.grid.crossing_nodes[:, 0] if every else None
         try:
             found.append(WayUp(by, every, erect(shell, design, by=by, props=props)))

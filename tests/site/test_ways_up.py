@@ -20,9 +20,14 @@ def test_where_rods_bear_the_usual_way_up_no_other_is_tried(dome):
 
 @pytest.mark.parametrize(
     ("shares", "tried"),
-    [((1.0,), [True]), ((1.001, 1.0), [False, True]), ((1.001, 1.002), [False, False])],
+    [
+        ((1.0,), [True]),
+        ((1.001, 1.0), [False, True]),
+        ((1.001, 1.002, 0.9), [False, False, True]),
+        ((1.001, 1.002, 1.1), [False, False, False]),
+    ],
 )
-def test_where_rods_break_on_it_a_scaffold_under_every_crossing_is_tried_and_may_break_them_too(
+def test_where_rods_break_on_it_scaffolds_are_tried_under_every_crossing_and_under_every_second_one(
     dome, monkeypatch, shares, tried
 ):
     asked, left = [], list(shares)
@@ -35,9 +40,18 @@ def test_where_rods_break_on_it_a_scaffold_under_every_crossing_is_tried_and_may
     found = ways_up(dome, dome.design())
     assert [each.bears for each in found] == tried
     assert asked[0] == {"by": SUPPORTS, "props": None}
-    for way in asked[1:]:
+    for way in asked[1:2]:
         assert way["by"] == SCAFFOLD
         np.testing.assert_array_equal(way["props"], dome.net.grid.crossing_nodes[:, 0])
+    assert asked[2:] in ([], [{"by": SCAFFOLD, "props": None}])
+
+
+def test_the_usual_way_up_is_not_tried_twice(dome, monkeypatch):
+    monkeypatch.setattr(module, "usual_way_up", lambda shell: SCAFFOLD)
+    monkeypatch.setattr(module, "erect", lambda shell, design, **way: SimpleNamespace(utilisation=2.0))
+    assert [(way.by, way.every) for way in ways_up(dome, dome.design())] == [
+        (SCAFFOLD, False), (SCAFFOLD, True)
+    ]  # fmt: skip
 
 
 def test_ways_on_which_no_stable_path_leads_up_say_why_and_bear_nothing(dome, monkeypatch):
@@ -46,5 +60,9 @@ def test_ways_on_which_no_stable_path_leads_up_say_why_and_bear_nothing(dome, mo
 
     monkeypatch.setattr(module, "erect", lost)
     found = ways_up(dome, dome.design())
-    assert [way.lost for way in found] == ["It snaps by supports", "It snaps by scaffold"]
+    assert [way.lost for way in found] == [
+        "It snaps by supports",
+        "It snaps by scaffold",
+        "It snaps by scaffold",
+    ]
     assert not any(way.bears for way in found)
