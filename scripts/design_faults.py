@@ -51,6 +51,7 @@ _TICK = 1.0 / os.sysconf("SC_CLK_TCK")
 _LOOK = 0.02  # s between two looks
 _SIGNALS = [signal.SIGKILL, signal.SIGKILL, signal.SIGINT, signal.SIGTERM]
 _STOPPED = 130  # the status after Ctrl-C
+_FALLS = 3  # the status of a design that was made and doesn't hold
 _LONGEST = 120.0  # s from a signal to the end of what it stops
 
 
@@ -70,6 +71,9 @@ def main() -> int:
     # The page tells its folder's name, which is the same for all.
     whole, times = place / "whole" / NAME, Counter[str]()
     end = run(whole, settings, times=times)
+    if end not in (0, _FALLS):
+        print(whole.with_suffix(".log").read_text(encoding="utf-8"), file=sys.stderr)
+        return 1
     print(
         "undisturbed, s of processor time: " + ", ".join(f"{k} {v:.1f}" for k, v in times.items()), flush=True
     )
