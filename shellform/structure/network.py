@@ -163,13 +163,16 @@ def repeated(ends: Indices) -> tuple[Indices, Indices]:
 
 
 def _side_by_side(network: Network) -> list[str]:
-    told = []
-    for name, ends in (("beam", network.beams.ends), ("cable", network.cables.ends)):
-        again, earlier = repeated(ends)
+    told, beams = [], network.beams
+    # What adds to another beam in part only, as the locks of two layers, is meant.
+    whole = np.flatnonzero(beams.axial > 0.0)
+    cables = np.arange(len(network.cables.ends))
+    for name, ends, own in (("beam", beams.ends, whole), ("cable", network.cables.ends, cables)):
+        again, earlier = repeated(ends[own])
         if len(again):
             told.append(
                 f"{how_many(len(again), f'{name} joins', f'{name}s join')} two nodes that another one joins, "
-                f"{name}s[{again[0]}] beside {name}s[{earlier[0]}] the first; all count."
+                f"{name}s[{own[again[0]]}] beside {name}s[{own[earlier[0]]}] the first; all count."
             )
     return told
 
