@@ -37,6 +37,6 @@ class RareRecord:
     design: str
     load: str
     probability: float
-    variation: float | None
     structures: int
     shares: Mapping[str, float]
+    variation: float | None = None

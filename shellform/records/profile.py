@@ -36,8 +36,8 @@ class StageProfile:
     clock: float
     processor: float
     waiting: float
-    memory_peak: int | None
     work: Mapping[str, WorkRecord]
+    memory_peak: int | None = None
 
 
 @dataclass(frozen=True)

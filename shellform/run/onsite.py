@@ -27,7 +27,7 @@ from shellform.gridshell.gridshell import Gridshell
 from shellform.quantities import PLACE_DEVIATION, TURN, newtons
 from shellform.run.erection_told import EVERY, broken_told, off_design, scaffold_told
 from shellform.run.folder import Run, read_run
-from shellform.run.site_sources import design_named, load_named, scan_under, scanned
+from shellform.run.site_sources import design_named, load_named, named_files, scan_under, scanned
 from shellform.site import calibration, erection, measurements, retensioning
 from shellform.site.scans import counted_alike
 from shellform.site.surveys import doubtful, read_survey
@@ -67,6 +67,8 @@ def calibrate(
     measurements.check_noise(noise)
     grid = scanned(source, design, output, allow_scripts=allow_scripts)
     shell = grid.shell
+    files = [grid.folder / "calibration.csv", grid.folder / "calibration.toml"]
+    refuse_overwriting(files, [source, markers, *named_files(scans)])
     pairs = [scan_under(each, grid, unit, None if placed else 0) for each in scans]
     pairs, counted = counted_alike(pairs, shell.target.positions, grid.origin)
     nodes = _marked(markers, shell)
@@ -74,7 +76,6 @@ def calibrate(
         shell, grid.design, pairs, nodes, free=free or calibration.PARAMETERS, noise=noise, offsets=offsets
     )
     joint = {name: getattr(found.joint, name) for name in (*calibration.PARAMETERS, "gap")}
-    files = [grid.folder / "calibration.csv", grid.folder / "calibration.toml"]
     write_text(files[0], found.table())
     write_text(files[1], tomli_w.dumps({"joint": joint}))
     seen = 1e3 * found.after[np.isfinite(found.after)]
@@ -179,6 +180,8 @@ def replay(
     require_count(rounds, where="--replay", give="a number of rounds, such as 3")
     retensioning.check_slip(slip)
     run = read_run(folder)
+    file = make_folder(output or run.folder / "schedules") / "replay.csv"
+    refuse_overwriting([file], [options.after, markers])
     name, shell, belief = _believed(run, options)
     nodes = _marked(markers, shell)
     errors = options.length_error * np.random.default_rng(seed).normal(size=len(shell.cable_ends))
@@ -206,7 +209,6 @@ def replay(
             ),
         )
     )
-    file = make_folder(output or run.folder / "schedules") / "replay.csv"
     write_text(file, text)
     gone = f"{100.0 * played.removed:.0f} % of the misfit is gone after {how_many(len(played.adjustments), 'round', 'rounds')}"
     return SiteResult([*text.splitlines(), gone], [file])
@@ -234,6 +236,9 @@ def erect(
     run = read_run(folder)
     name = design_named(run, design, run.best)
     shell = run.shell_of(name)
+    where = make_folder(output or run.folder / "schedules")
+    files = [where / "erection.csv", where / "erection.npz"]
+    refuse_overwriting(files, [Path(each) for each in (props, load, weight, lift, groups, way) if each])
     carried = [None if each is None else load_named(each, shell, run.loads) for each in (load, weight, lift)]
     origin = run.case.surface.origin
     stops, counted = ([], ()) if way is None else measurements.read_way(way, shell, origin)
@@ -250,8 +255,6 @@ def erect(
         lift=carried[2],
         step=step,
     )
-    where = make_folder(output or run.folder / "schedules")
-    files = [where / "erection.csv", where / "erection.npz"]
     write_text(files[0], done.table())
     write_arrays(
         files[1],

@@ -57,7 +57,7 @@ class Profiler:
         waiting = max(clock - processor, 0.0)
         work = {each.value: found[each.value] for each in Work if each.value in found}
         peak = _peak() if self._watched else None
-        return StageProfile(key, clock, processor, waiting, peak, work | {Work.REST.value: rest})
+        return StageProfile(key, clock, processor, waiting, work | {Work.REST.value: rest}, peak)
 
 
 def _processor() -> float:

@@ -46,7 +46,7 @@ def rare_of(
         examined.name,
         load,
         found.found.probability if fell else found.found.reached,
-        found.found.variation if fell else None,
         found.found.evaluations,
         found.shares,
+        found.found.variation if fell else None,
     )

@@ -3,7 +3,7 @@ name, and scans under them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,6 +66,11 @@ def scan_under(text: str, grid: Scanned, unit: str, frame: int | None) -> Scan:
     without a load the grid stood alone. Raises InputError as the readers of both."""
     points, _, load = text.partition("=")
     return Scan(read_points(points, unit=unit), load_named(load or "none", grid.shell, grid.loads), frame)
+
+
+def named_files(scans: Sequence[str]) -> list[Path]:
+    """What "POINTS.csv=LOAD" of each scan names, load cases too, which are no files."""
+    return [Path(each) for scan in scans for each in scan.partition("=")[::2] if each]
 
 
 def load_named(name: str, shell: Gridshell, loads: Mapping[str, Reals]) -> Reals:

@@ -19,6 +19,7 @@ _APART = 1e12  # ratio of stiffnesses of which double precision leaves four digi
 _MISFIT = 2.0  # ratio of a beam's rest length to the distance of its nodes
 _STRAIGHT = 1e-9  # off the axis, over the rod's length
 _WIDE, _SLENDER = 150.0, 1e4  # m; length over radius of gyration: in metres elements of wire keep below it
+_SPUN = 1e-4  # rad about an axis that is held, below which a node counts as not turned about it
 _LOOSE = 1e-12  # of the firmest, an eigenvalue of what holds a part, below which it doesn't
 
 
@@ -123,6 +124,22 @@ def lost_moments(network: Network, load: Reals) -> list[str]:
     return [f"Moments act on nodes that no beam touches, nodes[{first}] the first: nothing bears them."]
 
 
+def held_spins(network: Network, rotations: Reals) -> list[str]:
+    """The same of nodes one of whose three rotations is held, with total `rotations` (n, 3), rad: held is
+    their spin about that axis, step by step, and turns about both others add up to one about it, by the order
+    in which they come."""
+    held = network.fixed[:, 3:]
+    off = np.where(held & (held.sum(axis=1) == 1)[:, None], np.abs(rotations), 0.0)
+    node, axis = np.unravel_index(int(np.argmax(off)), off.shape)
+    if not off[node, axis] > _SPUN:
+        return []
+    return [
+        f"At nodes[{node}] only the rotation about {'xyz'[axis]} is held: held is its spin in each step, and by turning about both "
+        f"other axes it has turned by {number(off[node, axis], 2)} rad about that one, by how much depends on the steps. Take more "
+        "increments, or hold two rotations or none."
+    ]
+
+
 def _coincident(network: Network) -> list[str]:
     order = np.lexsort(network.nodes.T)
     same = (network.nodes[order[1:]] == network.nodes[order[:-1]]).all(axis=1)
@@ -146,13 +163,16 @@ def repeated(ends: Indices) -> tuple[Indices, Indices]:
 
 
 def _side_by_side(network: Network) -> list[str]:
-    told = []
-    for name, ends in (("beam", network.beams.ends), ("cable", network.cables.ends)):
-        again, earlier = repeated(ends)
+    told, beams = [], network.beams
+    # What adds to another beam in part only, as the locks of two layers, is meant.
+    whole = np.flatnonzero(beams.axial > 0.0)
+    cables = np.arange(len(network.cables.ends))
+    for name, ends, own in (("beam", beams.ends, whole), ("cable", network.cables.ends, cables)):
+        again, earlier = repeated(ends[own])
         if len(again):
             told.append(
                 f"{how_many(len(again), f'{name} joins', f'{name}s join')} two nodes that another one joins, "
-                f"{name}s[{again[0]}] beside {name}s[{earlier[0]}] the first; all count."
+                f"{name}s[{own[again[0]]}] beside {name}s[{own[earlier[0]]}] the first; all count."
             )
     return told
 

@@ -344,9 +344,9 @@ def test_quantities_have_units_of_handy_size():
 def test_the_table_of_what_stages_took_has_sums_and_the_largest_peak_last():
     profile = Profile(
         stages={
-            "net": StageProfile("net", 2.5, 1.25, 0.5, 120e6, {"other": WorkRecord(0, 0.0, 0.0), "solve": WorkRecord(3, 1.0, 0.75)}),
-            "initial": StageProfile("initial", 1.0, 0.75, 0.25, 90e6, {}),
-            "safety": StageProfile("safety", 10.0, 8.5, 0.25, None, {"search": WorkRecord(1500, 6.0, 5.5), "solve": WorkRecord(2, 1.0, 0.5), "other": WorkRecord(1, 3.0, 2.5)}),
+            "net": StageProfile("net", 2.5, 1.25, 0.5, {"other": WorkRecord(0, 0.0, 0.0), "solve": WorkRecord(3, 1.0, 0.75)}, 120e6),
+            "initial": StageProfile("initial", 1.0, 0.75, 0.25, {}, 90e6),
+            "safety": StageProfile("safety", 10.0, 8.5, 0.25, {"search": WorkRecord(1500, 6.0, 5.5), "solve": WorkRecord(2, 1.0, 0.5), "other": WorkRecord(1, 3.0, 2.5)}),
         }
     )  # fmt: skip
     table = profile_table(profile)

@@ -3,7 +3,9 @@ key.
 """
 
 import json
-from dataclasses import replace
+from dataclasses import MISSING, fields, is_dataclass, replace
+from types import NoneType
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -11,7 +13,10 @@ import pytest
 from shellform.errors import Damaged, InputError
 from shellform.optimiser.optimum import Step, by_constraint
 from shellform.output.page.report import _charts
+from shellform.records.drawn import Drawn
+from shellform.records.failures import RareRecord
 from shellform.records.history import read_history, write_history
+from shellform.records.profile import Profile, StageProfile, read_profile, write_profile
 from shellform.records.raising import WayUpRecord
 from shellform.records.scattering import SampleRecord
 from shellform.records.stages import StagesDone, read_stages, write_stages
@@ -52,6 +57,37 @@ def test_a_summary_is_read_back_as_it_was_written(tmp_path):
     write_summary(tmp_path, whole)
     assert read_summary(tmp_path) == whole
     assert read_summary(tmp_path / "nowhere") == Summary()
+
+
+def test_what_a_record_leaves_out_is_read_back_as_none(tmp_path):
+    """A run with safety.rare in which no structure fell left a summary.json that nothing could read, and one
+    with --profile a profile.json, where the system doesn't tell the memory."""
+    found = RareRecord("polished", "design", 0.0005, 620, {})
+    write_summary(tmp_path, replace(summary(NAMES), rare=(found,)))
+    assert read_summary(tmp_path).rare == (found,)
+    measured = Profile(cores=2).also("net", StageProfile("key", 2.0, 1.0, 1.0, {}))
+    write_profile(tmp_path, measured)
+    assert read_profile(tmp_path) == measured
+
+    def unreadable(kind, seen):
+        """Fields of a record, and of those in it, that are left out where they are None, and then missed."""
+        if kind in seen:
+            return
+        seen.add(kind)
+        hints = get_type_hints(kind)
+        for each in fields(kind):
+            inside = [hints[each.name]]
+            for part in inside:
+                inside += get_args(part)
+                if isinstance(part, type) and is_dataclass(part):
+                    yield from unreadable(part, seen)
+            needed = each.default is MISSING and each.default_factory is MISSING
+            if NoneType in inside and needed and "beside" not in each.metadata:
+                yield f"{kind.__name__}.{each.name}"
+
+    assert list(unreadable(Summary, set())) == []
+    assert list(unreadable(Profile, set())) == []
+    assert list(unreadable(Drawn, set())) == []
 
 
 def test_whether_a_load_is_a_multiple_of_the_design_load_is_kept_and_taken_for_granted_of_older_runs(

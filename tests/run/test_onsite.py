@@ -148,6 +148,27 @@ def test_a_survey_overwrites_nothing_that_it_reads_and_goes_on_from_beliefs_with
     onsite.survey(folder, tmp_path / "predicted.csv", onsite.Survey(), tmp_path / "other")
 
 
+def test_calibration_erection_and_replays_overwrite_nothing_that_they_read(folder, run, tmp_path):
+    crossings = run.shell.net.grid.crossing_nodes[:, 1]
+    points = run.states["initial"]["none"].positions[crossings]
+    scan = written(tmp_path / "calibration.csv", "x,y,z", points)
+    force = written(tmp_path / "erection.csv", "crossing,fz", [(0, -0.1)])
+    marks = written(tmp_path / "replay.csv", "crossing", [(k,) for k in range(0, 170, 4)])
+    before = [file.read_bytes() for file in (scan, force, marks)]
+    for read in (
+        lambda: onsite.calibrate(folder, [f"{scan}=none"], placed=True, output=tmp_path),
+        lambda: onsite.calibrate(folder, [f"{marks}={scan}"], placed=True, output=tmp_path),
+        lambda: onsite.erect(folder, load=str(force), output=tmp_path),
+        lambda: onsite.erect(folder, by="scaffold", props=str(force), output=tmp_path),
+        lambda: onsite.replay(
+            folder, onsite.Survey(), rounds=1, seed=0, slip=0.0, markers=marks, output=tmp_path
+        ),
+    ):
+        with pytest.raises(InputError, match="is read and would be overwritten"):
+            read()
+    assert [file.read_bytes() for file in (scan, force, marks)] == before
+
+
 def test_the_loop_of_survey_and_turns_can_be_replayed_with_noise(folder, tmp_path):
     marks = written(tmp_path / "marks.csv", "crossing", [(k,) for k in range(0, 176, 4)])
     result = shellform(

@@ -481,6 +481,22 @@ def test_a_moment_on_a_node_that_no_beam_touches_is_told_to_be_lost():
     assert analyse(Model(bent, {"m": load_at(bent, 1, [0, 0, 0, 0, 0.1, 0])}, None, (0,))).warnings == ()
 
 
+def test_a_node_with_one_rotation_held_that_turns_about_both_others_is_told_to_depend_on_its_steps():
+    """It ended turned by 0.7 mrad about the axis that was held, or by 6 with --method dynamic, untold."""
+    points = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.1], [1.0, 0.0, 0.0], [0.5, 0.5, 0.0]])
+    fork = [True, True, True, True, False, False]
+
+    def loaded(*moment, held=fork):
+        network = chain(points, (1e4, 3.0, 5.0, 4.0), {0: held, 3: CLAMP})
+        moved = Model(network, {"m": load_at(network, 0, [0.0, 0.0, 0.0, *moment])}, None, (0, 3))
+        return analyse(moved, load="m", increments=2)
+
+    (told,) = (each for each in loaded(0.0, 4.0, 4.0).warnings if each.startswith("At nodes[0]"))
+    assert "only the rotation about x is held" in told
+    for bent in (loaded(0.0, 4.0, 4.0, held=HINGE), loaded(0.0, 4.0, 4.0, held=[True] * 5 + [False])):
+        assert not any(each.startswith("At nodes") for each in bent.warnings)
+
+
 def test_a_gate_between_two_hinges_is_told_to_swing_where_nothing_loads_it():
     """Its tangent is singular but for 3e-10 N/m that hold rotations: it was stable without a word."""
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])

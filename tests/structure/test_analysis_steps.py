@@ -216,6 +216,15 @@ def test_a_mesh_is_told_to_be_coarse_from_half_a_per_cent_on_to_either_side(fine
     assert too_coarse(None) == []
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_factor_that_halved_beams_leave_far_behind_is_told_with_theirs_and_not_extrapolated(side):
+    """Of two pinned bars in one beam each 29.6 was told to be 133 % too high (extrapolated -9.9)."""
+    (told,) = too_coarse(Refined(29.6 * side, 0.1 * side))
+    assert told.startswith(f"With beams halved the critical factor is {0.1 * side} instead of {29.6 * side}:")
+    assert "extrapolated" not in told
+    assert "extrapolated 14" in too_coarse(Refined(20.0 * side, 15.5 * side))[0].replace("-", "")
+
+
 def test_the_finer_mesh_is_followed_half_as_far_again_from_its_own_start(monkeypatch):
     asked = []
 

@@ -9,8 +9,9 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.quantities import number
-from shellform.structure.elements.beam import make_beams
+from shellform.structure.elements.beam import built_in, joined, make_beams
 from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.state import at_rest
 from shellform.structure.network import Network, check_restrained, doubts, swinging
 
 ALL = [True] * 6
@@ -79,6 +80,24 @@ def test_elements_that_join_the_same_two_nodes_in_either_direction_are_counted_a
     ]
     once = network(nodes, [[0, 1], [1, 2], [2, 3]], [[0, 1], [1, 2]], held={0: ALL})
     assert not [each for each in doubts(once) if "all count" in each], "a cable beside a rod is usual"
+
+
+def test_what_locks_two_layers_is_not_told_to_stand_beside_their_rods():
+    """Of each design in two layers analyse told that all of its rods' elements stood beside others."""
+    nodes = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0]]
+    bent = network(nodes, [[0, 1], [1, 2], [2, 3]], held={0: ALL})
+    stiffness = {"torsion": 0.0, "bending_y": 5.0, "bending_z": 0.0, "z_axis": [[0.0, 0.0, 1.0]] * 2}
+    state, ends = at_rest(bent.nodes), np.array([[0, 1], [1, 2]])
+
+    def beside(axial):
+        more = built_in(state, ends, axial=axial, kind="lock", **stiffness)
+        told = doubts(replace(bent, beams=joined(bent.beams, more)))
+        return [each for each in told if "all count" in each]
+
+    assert beside(0.0) == []
+    assert beside(1.0) == [
+        "2 beams join two nodes that another one joins, beams[3] beside beams[0] the first; all count."
+    ]
 
 
 def test_nodes_in_one_place_are_counted_and_the_first_pair_named():

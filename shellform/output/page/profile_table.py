@@ -30,8 +30,8 @@ def profile_table(profile: Profile) -> ProfileTable:
         sum(each.clock for each in every),
         sum(each.processor for each in every),
         sum(each.waiting for each in every),
-        max(peaks, default=None),
         {kind: _sum([_of(each, kind) for each in every]) for kind in kinds},
+        max(peaks, default=None),
     )
     rows = tuple((name, _cells(each, kinds)) for name, each in {**stages, "total": total}.items())
     return ProfileTable(

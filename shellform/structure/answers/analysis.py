@@ -31,7 +31,7 @@ from shellform.structure.answers.request import (
 from shellform.structure.answers.stability import Critical, Modes, critical_load, modes
 from shellform.structure.elements.state import State, at_rest, moved
 from shellform.structure.model import Model
-from shellform.structure.network import assemble, doubts, free_to_swing, lost_moments, swinging
+from shellform.structure.network import assemble, doubts, free_to_swing, held_spins, lost_moments, swinging
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.drive import Drive, turns_half
 from shellform.structure.solve.dynamic import dynamic
@@ -146,6 +146,7 @@ def analyse(
         warnings=(
             *doubts(model.network),
             *lost_moments(model.network, chosen),
+            *held_spins(model.network, found.state.rotations),
             *free_to_swing(walk.swinging),
             *walk.warnings(),
             *too_coarse(mesh),

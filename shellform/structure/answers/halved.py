@@ -32,6 +32,7 @@ from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.settled import prestressed
 
 _COARSE = 0.005  # of a critical factor, the error above which it is told
+_ANOTHER = 0.5  # of a critical factor, below which that with beams halved is no matter of order h²
 _CORNER = np.radians(30.0)  # between two beams that don't stand for a curve
 
 
@@ -84,6 +85,11 @@ def too_coarse(mesh: Refined | None) -> list[str]:
     """What has to be said of a critical factor that the size of the elements decides, in a sentence."""
     if mesh is None or abs(mesh.error) <= _COARSE * abs(mesh.coarse):
         return []
+    if mesh.fine / mesh.coarse < _ANOTHER:
+        return [
+            f"With beams halved the critical factor is {mesh.fine:.6g} instead of {mesh.coarse:.6g}: it gives way otherwise there, as "
+            "where beams buckle between their nodes: divide the rods into more elements."
+        ]
     share = 100.0 * abs(mesh.error / mesh.coarse)
     side = "high" if mesh.error * mesh.coarse > 0.0 else "low"
     return [
