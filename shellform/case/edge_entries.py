@@ -83,7 +83,8 @@ class EdgesEntry(Entry):
     )
     openings: _EdgeKind = Field("auto", description="the same for openings; fill: closed")
     ground: float | None = Field(
-        None, description="its level, m; left out: net.ground, or the outer edge's lowest point"
+        None,
+        description="its level, m; left out: net.ground, or what the outer edge shows, its lowest point or a slope",
     )
     stretch: list[StretchEntry] = Field([], description="parts of the edge, the first that holds counts")
     beam: EdgeBeamEntry = Field(

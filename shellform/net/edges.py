@@ -9,9 +9,9 @@ them off. Each stretch of such a curve has a kind:
     pin                      pinned in mid-air, by something that isn't part of the model
 
 `Edges` says which: the first of its stretches that a place lies in decides, and elsewhere the geometry. What
-lies within two hundredths of the surface's larger extent in plan above the ground stands on the ground; what
-is higher has an edge beam, which is carried down along the edge to where the edge stops falling steeply, its
-foot: an edge that undulates on the ground keeps it.
+lies within two hundredths of the surface's larger extent in plan above the ground (ground.py) stands on it;
+what is higher has an edge beam, which is carried down along the edge to where the edge stops falling
+steeply, its foot: an edge that undulates on the ground keeps it.
 A beam round an opening is a closed ring.
 
 The beam's axis lies on the edge itself, half a gap from the rods, with a node for each rod's end, one for
@@ -28,7 +28,9 @@ import numpy as np
 
 from shellform.arrays import Reals, Record, reals
 from shellform.errors import InputError, require_known
+from shellform.net.ground import Ground, ground_under
 from shellform.net.net import EdgeLine, Net, Stretch
+from shellform.net.notes import NetNote, NoteKind
 from shellform.net.polylines import nearest
 from shellform.net.rims import End, Rim, ends_of, rim_of
 from shellform.quantities import coordinates
@@ -39,7 +41,6 @@ from shellform.surface.shape.target import Surface
 
 HELD = ("ground", "wall", "abutment", "pin")  # kinds of stretches that hold the rods' ends
 KINDS = (*HELD, "beam", "free")
-LOW = 0.02  # of the larger extent in plan: an edge no higher over the ground stands on it
 _LONGEST = 0.5  # of the spacing: edge beams' elements aren't longer
 _STEEP = 0.1  # fall over length in plan: edges that stand on the ground, but unevenly, fall less
 # of the spacing: ends nearer to each other share a node of the edge beam, whose elements would drown the load
@@ -83,7 +84,7 @@ class Place(Record):
 class Edges:
     """`places` with their kinds, the first that holds deciding; elsewhere `outer` edges and edges of
     `openings` have a kind of `KINDS`, or "auto" the one that the geometry says; `ground`, m, its level (None:
-    the outer edge's lowest point)."""
+    what the outer edge shows, its lowest point or a slope)."""
 
     places: tuple[Place, ...] = ()
     outer: str = "auto"
@@ -103,10 +104,10 @@ def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals 
     nothing is left that holds the shell.
     """
     ends, rims = ends_of(net, surface, outline)
-    low = _low(surface, edges)
+    ground = ground_under(surface, edges.ground)
     _refuse_missed(edges, rims)
     for rim in rims:
-        _sort_out(rim, edges, low)
+        _sort_out(rim, edges, ground)
     builder = _Builder(net, rims)
     stretches = []
     for number, rim in enumerate(rims):
@@ -121,6 +122,11 @@ def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals 
             where="edges",
             remedy="Give its level in edges.ground, or name what it stands on in [[edges.stretch]].",
         )
+    if ground.slopes and any(each.kind == "ground" for each in stretches):
+        note = NetNote(
+            NoteKind.GROUND, f"the ground under the edge {ground.told}: [edges] ground makes it level"
+        )
+        net = replace(net, notes=(*net.notes, note))
     kept = set(held)
     supports = np.array(
         [node for node in net.supports.tolist() if node in kept] + builder.feet, dtype=np.int64
@@ -147,10 +153,10 @@ def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals 
 
 def stretches_of(surface: Surface, edges: Edges = Edges()) -> tuple[Stretch, ...]:
     """What the surface's edges are, before there is a net: a first look."""
-    low, found = _low(surface, edges), list[Stretch]()
+    ground, found = ground_under(surface, edges.ground), list[Stretch]()
     for number, loop in enumerate(surface.boundary):
         rim = rim_of(surface.vertices[loop], number > 0)
-        _sort_out(rim, edges, low)
+        _sort_out(rim, edges, ground)
         found += _stretches(rim)
     return tuple(found)
 
@@ -172,14 +178,7 @@ def _refuse_missed(edges: Edges, rims: Sequence[Rim]) -> None:
         )
 
 
-def _low(surface: Surface, edges: Edges) -> float:
-    """The level, m, up to which an edge stands on the ground."""
-    outer = surface.vertices[surface.boundary[0]]
-    level = float(outer[:, 2].min()) if edges.ground is None else edges.ground
-    return level + LOW * float(surface.size[:2].max())
-
-
-def _sort_out(rim: Rim, edges: Edges, low: float) -> None:
+def _sort_out(rim: Rim, edges: Edges, ground: Ground) -> None:
     """Gives each point of the rim its kind; edge beams go down to where the edge stops falling."""
     default = edges.openings if rim.opening else edges.outer
     count = len(rim.points)
@@ -187,7 +186,8 @@ def _sort_out(rim: Rim, edges: Edges, low: float) -> None:
     for number, place in enumerate(edges.places):
         decided[(decided < 0) & place.holds(rim.points, opening=rim.opening)] = number
     auto = (decided < 0) & (default == "auto")
-    standing = rim.points[:, 2] <= low
+    over = np.column_stack([rim.points[:, :2], ground.over(rim.points)])
+    standing = over[:, 2] <= ground.low
     rim.kinds = [
         edges.places[number].kind
         if number >= 0
@@ -210,14 +210,14 @@ def _sort_out(rim: Rim, edges: Edges, low: float) -> None:
                 rim.found[here]
                 and rim.kinds[here] == "ground"
                 and rim.found[(here + way) % count]
-                and _falls(rim.points[here], rim.points[(here + way) % count])
+                and _falls(over[here], over[(here + way) % count])
             ):
                 rim.kinds[here] = "beam"
                 here = (here + way) % count
 
 
 def _falls(here: Reals, there: Reals) -> bool:
-    """Whether an edge falls steeply between two of its points."""
+    """Whether an edge falls steeply between two of its points, whose heights are those over the ground."""
     return bool(here[2] - there[2] > _STEEP * np.linalg.norm(there[:2] - here[:2]))
 
 

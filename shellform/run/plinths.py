@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 
 from shellform.errors import InputError
-from shellform.net.edges import LOW
+from shellform.net.ground import LOW, ground_under
 from shellform.run.sizes import first_spacing
 from shellform.surface.shape.cut import cut_off
 from shellform.surface.shape.target import Surface, sharpest_bend
@@ -42,9 +42,10 @@ class Plinths:
 
 
 def plinths_for(surface: Surface) -> Plinths | None:
-    """The plinths with which a surface that is bent too sharply at its feet goes on; None where none help."""
+    """The plinths with which a surface that is bent too sharply at its feet goes on; None where none help,
+    and on ground that slopes, which no level cuts alike."""
     _, radius = sharpest_bend(surface)
-    if radius > _SHARP * first_spacing(surface)[0]:
+    if radius > _SHARP * first_spacing(surface)[0] or ground_under(surface).slopes:
         return None
     lowest = float(surface.vertices[:, 2].min())
     step = 10.0 ** math.floor(math.log10(LOW * float(surface.size[:2].max())) - 1)  # two digits

@@ -19,6 +19,7 @@ from shellform.gridshell.catalogue import label
 from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import Edges, stretches_of
+from shellform.net.ground import Ground, ground_under
 from shellform.net.net import Stretch
 from shellform.quantities import number
 from shellform.records.progress import Event, Kind, Report, unheard
@@ -170,7 +171,7 @@ def _written(
     """The case for the surface in `file`, written, with what was `told` before at its head, and what it
     proposes; `steady`: on which its structures wouldn't stray too far as built, where they do."""
     surface = ready.surface
-    edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)))
+    edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)), ground_under(surface))
     entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **ready.options}
     design = replace(design, told=(*told, *design.told))
     title = asked.file.stem + ("" if file == asked.file else ", nearest buildable surface")
@@ -358,19 +359,20 @@ def _check(output: Path) -> None:
         )
 
 
-def _edges_told(stretches: Sequence[Stretch]) -> str:
+def _edges_told(stretches: Sequence[Stretch], ground: Ground) -> str:
     """What was found, in a line: "2 stretches on the ground, 2 edge beams, 1 of them round an opening"."""
     beams = [each for each in stretches if each.kind == "beam"]
     standing, walls = len(stretches) - len(beams), all(each.kind in ("wall", "beam") for each in stretches)
     rings = sum(each.opening for each in beams)
-    told = f"{how_many(standing, 'stretch', 'stretches')} on {'walls' if walls else 'the ground'}"
+    sloping = f", which {ground.told}" if ground.slopes and not walls else ""
+    told = f"{how_many(standing, 'stretch', 'stretches')} on {'walls' if walls else 'the ground'}{sloping}"
     if not beams:
         return told
-    ground = min(float(each.points[:, 2].min()) for each in stretches)
-    highest = max(float(each.points[:, 2].max()) for each in beams) - ground
-    return (
-        f"{told}, {how_many(len(beams), 'edge beam', 'edge beams')} up to {highest:.3g} m above the lowest"
-        + (f", {rings} of them round openings" if rings else "")
+    lowest = min(float(ground.over(each.points).min()) for each in stretches)
+    highest = max(float(ground.over(each.points).max()) for each in beams) - lowest
+    over = "over it" if sloping else "above the lowest"
+    return f"{told}, {how_many(len(beams), 'edge beam', 'edge beams')} up to {highest:.3g} m {over}" + (
+        f", {rings} of them round openings" if rings else ""
     )
 
 

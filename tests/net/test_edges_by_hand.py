@@ -7,9 +7,11 @@ import pytest
 
 from shellform.net import edges as module
 from shellform.net.edges import Edges, Place
+from shellform.net.ground import Ground, ground_under
 from shellform.net.polylines import closed, nearest
 from shellform.net.rims import End, Rim, _chains, _reached, ends_of, rim_of
 from shellform.structure.elements.rotation import matrices
+from shellform.surface.shape.target import make_surface
 
 
 def test_a_place_holds_where_all_that_is_given_does_its_bounds_included():
@@ -42,9 +44,10 @@ def test_distances_from_an_open_plan_curve_are_those_from_its_nearest_piece():
 def test_an_edge_stands_on_the_ground_up_to_a_fiftieth_of_the_larger_extent_above_its_lowest_point_or_the_level_given():
     """10 m by 30 m: 0.6 m."""
     outer = np.array([[0.0, 0.0, 2.0], [10.0, 0.0, 5.0], [10.0, 30.0, 3.0]])
-    surface = SimpleNamespace(vertices=outer, boundary=[np.arange(3)], size=np.array([10.0, 30.0, 90.0]))
-    assert module._low(surface, Edges()) == pytest.approx(2.6)
-    assert module._low(surface, Edges(ground=-1.0)) == pytest.approx(-0.4)
+    surface = make_surface(outer, np.array([[0, 1, 2]]))
+    lowest, given = ground_under(surface), ground_under(surface, -1.0)
+    assert (lowest.level, lowest.low, lowest.slopes) == pytest.approx((2.0, 0.6, False))
+    assert (given.level, given.low, given.slopes) == pytest.approx((-1.0, 0.6, False))
 
 
 def loop(levels, *, opening=False, cut=False, step=1.0):
@@ -55,7 +58,7 @@ def loop(levels, *, opening=False, cut=False, step=1.0):
 
 def sorted_out(levels, edges=None, low=0.1, **how):
     made = loop(levels, **how)
-    module._sort_out(made, Edges() if edges is None else edges, low)
+    module._sort_out(made, Edges() if edges is None else edges, Ground(0.0, np.zeros(2), low))
     return made
 
 

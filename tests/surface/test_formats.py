@@ -598,6 +598,18 @@ def test_a_rhinovault_session_gives_its_thrust_diagram_without_openings():
     np.testing.assert_allclose(pillow.size, [10.0, 10.0, 3.535], atol=1e-3)
 
 
+@pytest.mark.parametrize(("height", "told"), [(0.0, True), (0.5, False)])
+def test_a_thrust_diagram_whose_vertical_equilibrium_is_not_solved_yet_is_told_to_be_flat(
+    tmp_path, height, told
+):
+    corners = {str(k): {"x": k % 3, "y": k // 3, "z": height * (k == 4)} for k in range(9)}
+    faces = {str(k): [j, j + 1, j + 4, j + 3] for k, j in enumerate((0, 1, 3, 4))}
+    file = tmp_path / "session.json"
+    file.write_text(json.dumps({"name": "ThrustDiagram", "vertex": corners, "face": faces}), encoding="utf-8")
+    mended = read_surface(file).mended
+    assert any("solve its vertical equilibrium" in each for each in mended) == told
+
+
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply", "off", "vtk", "vtu", "msh"])
 def test_a_surface_written_as_a_mesh_comes_back_and_is_the_same_bytes_each_time(tmp_path, ending):
     surface = cad.build_surface(ROOT / "surfaces/dome.py", size=0.05)

@@ -24,6 +24,7 @@ from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined, t
 from shellform.surface.readers.network_faces import faces_in_plan
 
 _SHELL, _FORCES = "ThrustDiagram", "ForceDiagram"
+_UNSOLVED = "the thrust diagram is flat as yet: solve its vertical equilibrium and save the session anew"
 _LOADED = ("_is_loaded", "is_loaded")  # of a face, as later and earlier versions call it
 
 
@@ -86,6 +87,8 @@ def read_compas(file: Path, choice: Choice) -> Draft:
                 "faces without load were left out as openings",
             )
         )
+    if [name for name, _ in found] == [_SHELL] and not np.ptp(draft.points[:, 2]):
+        notes.append(_UNSOLVED)
     return replace(draft, notes=tuple(notes))
 
 
