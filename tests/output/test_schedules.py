@@ -606,10 +606,15 @@ def test_a_rod_s_line_tells_its_mass_its_bars_and_its_parts(density, layers):
     built = SimpleNamespace(
         shell=SimpleNamespace(rod=rod), design=SimpleNamespace(radius=0.02), grid=SimpleNamespace(rods=rods)
     )
-    pieces = (
+    pieces = [
         [nesting.Piece(1, 2, 2, 5.0, 2.0), nesting.Piece(0, 1, 1, 0.0, 3.0)],
         [nesting.Piece(1, 1, 2, 0.0, 5.0)],
-    )
+    ]
+    if layers == 2:
+        pieces += [
+            [nesting.Piece(1, 1, 2, 0.0, 2.0, 2), nesting.Piece(0, 1, 1, 0.0, 3.0, 2)],
+            [nesting.Piece(1, 2, 2, 2.0, 5.0, 2)],
+        ]
     cutting = nesting.Cutting(6.0, 0.003, tuple(nesting.Bar(tuple(each), 1.0) for each in pieces), 2)
     table = schedules.rods(built, cutting)
     whole, spliced = table.rows
@@ -617,8 +622,18 @@ def test_a_rod_s_line_tells_its_mass_its_bars_and_its_parts(density, layers):
     assert (whole[4], spliced[4]) == (
         (None, None) if density == 0.0 else pytest.approx((layers * 2.415, layers * 5.635))
     )
-    assert whole[5:] == (2, "250.0 2500.0", "4 1", "B1", "")
-    assert spliced[5:] == (3, "1000.0 3000.0 6500.0", "0 1 2", "part 1: B2, part 2: B1", "spliced")
+    assert whole[5:] == (2, "250.0 2500.0", "4 1", "B1" if layers == 1 else "B1, B3", "")
+    parts = (
+        "part 1: B2, part 2: B1"
+        if layers == 1
+        else "lath 1, part 1: B2, lath 1, part 2: B1, lath 2, part 1: B3, lath 2, part 2: B4"
+    )
+    assert spliced[5:] == (3, "1000.0 3000.0 6500.0", "0 1 2", parts, "spliced")
+    told = [row[3] for row in schedules.bars(built, cutting).rows]
+    if layers == 2:
+        assert told == ["lath 1, 2 of 2", "", "lath 1, 1 of 2", "lath 2, 1 of 2", "", "lath 2, 2 of 2"]
+    else:
+        assert told == ["2 of 2", "", "1 of 2"]
     assert ("Each rod is two laths" in " ".join(table.notes)) == (layers == 2)
     assert ("No masses" in " ".join(table.notes)) == (density == 0.0)
 

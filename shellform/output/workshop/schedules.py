@@ -45,7 +45,7 @@ from shellform.output.workshop.cable_forces import force_notes
 from shellform.output.workshop.directions import away, turning_note
 from shellform.output.workshop.edge_schedule import edge_table
 from shellform.output.workshop.nesting import Cutting
-from shellform.output.workshop.splice_schedule import cutting_notes, splice_table
+from shellform.output.workshop.splice_schedule import cutting_notes, lath_names, splice_table
 from shellform.output.workshop.turnbuckles import cutting_note, turnbuckle_notes
 from shellform.quantities import newtons
 from shellform.structure.elements.sections import mass_per_length
@@ -115,16 +115,17 @@ def rods(built: Built, cutting: Cutting) -> Table:
     """The rods: lengths, marks, section, mass, and from which bars they are cut."""
     section = built.shell.rod.resized(built.design.radius).section
     weight = mass_per_length(section)
-    places: dict[int, list[tuple[int, str]]] = {}
+    places: dict[int, list[tuple[int, int, str]]] = {}
+    of_lath = lath_names(cutting)
     for number, bar in enumerate(cutting.bars, 1):
         for piece in bar.pieces:
-            said = f"B{number}" if piece.parts == 1 else f"part {piece.part}: B{number}"
-            places.setdefault(piece.rod, []).append((piece.part, said))
+            said = f"B{number}" if piece.parts == 1 else f"{of_lath[piece.lath]}part {piece.part}: B{number}"
+            places.setdefault(piece.rod, []).append((piece.lath, piece.part, said))
     rows = tuple(
         (
             name, rod.direction, rod.length, label(section, 2), weight * rod.length if weight else None,
             len(rod.marks), " ".join(f"{1e3 * mark:.1f}" for mark in rod.marks),
-            " ".join(map(str, rod.crossings.tolist())), ", ".join(said for _, said in sorted(places[k])),
+            " ".join(map(str, rod.crossings.tolist())), ", ".join(said for _, _, said in sorted(places[k])),
             "spliced" if k in cutting.spliced else "",
         )
         for k, (name, rod) in enumerate(zip(rod_names(built.grid), built.grid.rods, strict=True))
@@ -166,12 +167,12 @@ def marks(built: Built) -> Table:
 
 def bars(built: Built, cutting: Cutting) -> Table:
     """One row a piece: which bar it is cut from, in which order, and the bar's offcut after the last one."""
-    names = rod_names(built.grid)
+    names, of_lath = rod_names(built.grid), lath_names(cutting)
     rows = []
     for number, bar in enumerate(cutting.bars, 1):
         at = 0.0
         for place, piece in enumerate(bar.pieces, 1):
-            part = "" if piece.parts == 1 else f"{piece.part} of {piece.parts}"
+            part = "" if piece.parts == 1 else f"{of_lath[piece.lath]}{piece.part} of {piece.parts}"
             last = bar.offcut if place == len(bar.pieces) else None
             rows.append((f"B{number}", place, names[piece.rod], part, piece.length, at, piece.start, last))
             at += piece.length + cutting.kerf
