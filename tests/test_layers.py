@@ -88,6 +88,7 @@ DOORS = {
 }
 ALSO = {  # the further doors, for the reason above
     "cvxopt": {"structure/solve/factorisation.py"},
+    "matplotlib": {"output/pictures/letters.py"},  # its fonts
     "vtkmodules": {"surface/readers/vtkfiles.py"},
 }
 SMALL = {"numpy", "scipy", "msgspec", "pydantic", "rich", "tomli_w", "typer"}  # used where they are needed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,14 @@ from shellform.case.case import (
 from shellform.case.edge_entries import EdgeBeamEntry
 from shellform.errors import InputError
 from shellform.gridshell import loads
-from shellform.gridshell.catalogue import Catalogue, largest, named, radius_bounds, read_catalogue
+from shellform.gridshell.catalogue import (
+    Catalogue,
+    largest,
+    named,
+    radius_bounds,
+    read_catalogue,
+    shipped_catalogues,
+)
 from shellform.gridshell.edge_beams import Bundle, EdgeBeam, weight
 from shellform.gridshell.gridshell import (
     Cable,
@@ -221,11 +229,27 @@ def _region(entry: ConcreteEntry | SheetEntry) -> Region:
     return Region(entry.openings, entry.inside, turned, strip, entry.ring)
 
 
+def own_catalogues(case: Case) -> dict[str, Path]:
+    """Files of the case's own catalogues, those that don't come with shellform, by the table that names
+    them."""
+    named_by = {
+        "optimise": case.optimise.catalogue,
+        "rod": case.rod.catalogue if isinstance(case.rod, StockRodEntry) else None,
+        "edges": case.edges.beam.catalogue,
+    }
+    shipped = shipped_catalogues()
+    return {table: Path(each) for table, each in named_by.items() if each is not None and each not in shipped}
+
+
+def with_catalogues(case: Case, files: Mapping[str, str]) -> Case:
+    """The case with other files for its own catalogues, by the table that names them."""
+    entries: dict[str, Any] = {"optimise": case.optimise, "rod": case.rod, "edges": case.edges.beam}
+    renamed = {table: entries[table].model_copy(update={"catalogue": file}) for table, file in files.items()}
+    if "edges" in renamed:
+        renamed["edges"] = case.edges.model_copy(update={"beam": renamed["edges"]})
+    return case.model_copy(update=renamed)
+
+
 def catalogue_bytes(case: Case) -> bytes:
     """The content of the case's own catalogues, if it has any, for the keys of its stages."""
-    sources = [
-        case.optimise.catalogue,
-        case.rod.catalogue if isinstance(case.rod, StockRodEntry) else None,
-        case.edges.beam.catalogue,
-    ]
-    return b"".join(Path(each).read_bytes() for each in sources if each is not None and Path(each).is_file())
+    return b"".join(each.read_bytes() for each in own_catalogues(case).values() if each.is_file())

@@ -54,14 +54,33 @@ def watched(
 
 
 def case_files(case: Path, settings: Sequence[str]) -> list[Path]:
-    """The case's file and, where the case can be read, those of its surface."""
+    """The case's file and, where the case can be read, those of its surface and of its own catalogues; where
+    it can't be, what it names as one."""
+    from shellform.case.build_gridshell import own_catalogues
     from shellform.case.case import load_case
     from shellform.surface.readers.gltf import surface_files
 
     try:
-        return [case, *surface_files(Path(load_case(case, settings).surface.file))]
+        read = load_case(case, settings)
+        return [case, *surface_files(Path(read.surface.file)), *dict.fromkeys(own_catalogues(read).values())]
     except InputError:  # which `once` tells
-        return [case]
+        return [case, *_catalogues_named(case)]
+
+
+def _catalogues_named(case: Path) -> list[Path]:
+    """The files that a case which is refused names as catalogues: what is wrong may stand in one of them."""
+    from shellform.case.case import read_toml
+    from shellform.gridshell.catalogue import shipped_catalogues
+
+    try:
+        data = read_toml(case)
+    except InputError:
+        return []
+    edges = data.get("edges")
+    tables = [data.get("optimise"), data.get("rod"), edges.get("beam") if isinstance(edges, dict) else None]
+    named = [table["catalogue"] for table in tables if isinstance(table, dict) and "catalogue" in table]
+    own = [each for each in named if isinstance(each, str) and each not in shipped_catalogues()]
+    return [(case.parent / each).resolve() for each in dict.fromkeys(own) if "\0" not in each]
 
 
 def _wait(seen: Stamps) -> None:

@@ -82,7 +82,12 @@ def write_documents(run: Run, *, report: Report = unheard) -> DocumentsRecord:
     if exports.no_step():
         report(Event("documents", f"no STEP file: {exports.no_step()}", Kind.NOTE))
     bars, *spliced = cutting_notes(cutting, rod_names(run.net.grid))
-    doubts = (*spliced, *(_UNKNOWN if built.hung is None else ()), *schedules.turnbuckles_of_cables(built))
+    doubts = (
+        *spliced,
+        *(_UNKNOWN if built.hung is None else ()),
+        *schedules.turnbuckles_of_cables(built),
+        *drawings.letters_note(built),
+    )
     for note in doubts:
         report(Event("documents", note, Kind.NOTE))
     cut = cut_counts(built.shell.cables(built.design).rest_length, built.adjustment)

@@ -35,7 +35,7 @@ LOCK = "lock"
 DESIGNS = ("unbraced", "initial", "unloaded", *BUILT)
 WRITTEN = (
     "case.toml", "summary.json", "stages.json", "history.csv", "surface.npz", "net.npz", "net.json", "designs", "states", "figures",
-    "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt", "profile.json", LOCK,
+    "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt", "profile.json", "catalogues", LOCK,
 )  # fmt: skip
 
 
@@ -47,6 +47,7 @@ _PARTS = (
     "drawings",
     "schedules",
     "models",
+    "catalogues",
 )  # folders that files stand in
 
 

@@ -23,7 +23,7 @@ from shellform.arrays import Reals, Record
 from shellform.case.beside_surface import doubts, refuse_beside
 from shellform.case.build_gridshell import gridshell, rod_limits
 from shellform.case.build_net import net_of, net_record, size_text, surface_of, surface_record, with_rods
-from shellform.case.case import Case, check_script, dump_case
+from shellform.case.case import Case, check_script
 from shellform.errors import InputError, NotConverged, ShellformError, require_file
 from shellform.gridshell.gridshell import Gridshell, TooCurved
 from shellform.gridshell.joints import doubts as joint_doubts
@@ -39,6 +39,7 @@ from shellform.run.broken_off import break_off
 from shellform.run.checkpoint import drop_checkpoint
 from shellform.run.folder import alone, load_surface, read_run, refuse_links, refuse_overwriting, save_surface
 from shellform.run.judged import judged
+from shellform.run.kept_case import write_case
 from shellform.run.keys import stage_keys
 from shellform.run.lasting import lasting
 from shellform.run.log import logged
@@ -187,7 +188,7 @@ def _run_alone(workspace: Workspace, fresh: bool, parts: Parts, began: float) ->
         write_stages(folder, done)
         write_summary(folder, summary)
     drop_other(folder, sketch=workspace.sketch)
-    write_text(folder / "case.toml", dump_case(workspace.case))
+    write_case(folder, workspace.case)
     return _stages(workspace, parts, summary, done, began)
 
 
@@ -314,7 +315,7 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
     except TooCurved as error:
         raise _with_way_out(workspace, "initial", error, surface, error.radius, made) from error
     parts = replace(parts, shell=shell, loads=loads)
-    write_text(workspace.path("case.toml"), dump_case(case, default_tolerances(shell)))
+    write_case(workspace.folder, case, default_tolerances(shell))
     net = with_rods(_there(summary.net), rod_limits(case.rod, shell.net))
     summary = replace(summary, net=net)
     for doubt in joint_doubts(shell.joint, shell.rod):

@@ -111,6 +111,24 @@ def test_the_buffers_of_a_scene_are_watched_with_it_also_before_they_are_there(t
     assert case_files(case, ["net.spacing=-1"]) == [case]
 
 
+def test_the_case_s_own_catalogue_is_watched_with_it_also_while_it_is_refused(tmp_path):
+    case, mine = tmp_path / "case.toml", tmp_path / "mine.toml"
+    before, _, after = CASE.partition("[rod]")
+    case.write_text(
+        f'{before}[rod]\ncatalogue = "mine.toml"\nsection = "2 mm"\n{after[after.index("[joint]") :]}',
+        encoding="utf-8",
+    )
+    good = (
+        "[material]\nyoung = 40e9\nshear = 4e9\ndensity = 1900\nstrength = 255e6\n[sizes]\nround = [0.002]\n"
+    )
+    for text in (good, good.replace("0.002", "-0.002"), "[material"):
+        mine.write_text(text, encoding="utf-8")
+        assert case_files(case, [])[0] == case
+        assert case_files(case, [])[-1] == mine.resolve()
+    case.write_text("[rod", encoding="utf-8")
+    assert case_files(case, []) == [case]
+
+
 def test_what_is_wrong_from_the_outset_is_refused(tmp_path):
     ended = shellform("design", tmp_path / "none.toml", "--output", tmp_path / "run", "--watch")
     assert ended.returncode == 2

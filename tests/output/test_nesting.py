@@ -8,7 +8,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.output.workshop import nesting
-from shellform.output.workshop.splice_schedule import cutting_notes
+from shellform.output.workshop.splice_schedule import cutting_notes, lath_names
 
 
 def grid_of(*lengths, spacing=1.0):
@@ -106,6 +106,20 @@ def test_two_laths_of_a_rod_are_never_spliced_in_one_place_where_that_can_be_hel
     cutting = nesting.cut(grid_of(7.0), stock=4.0, kerf=0.0, laths=2)
     assert splices_of(cutting) == [0.5, 3.5, 4.5]
     assert cutting.spliced_through == ()
+
+
+def test_the_pieces_of_each_lath_reach_from_its_first_end_to_its_second():
+    """One is of two pieces, the other one of three, so that a part's number alone tells nothing."""
+    cutting = nesting.cut(grid_of(7.0), stock=4.0, kerf=0.0, laths=2)
+    pieces = [piece for bar in cutting.bars for piece in bar.pieces]
+    assert lath_names(cutting) == {1: "lath 1, ", 2: "lath 2, "}
+    for lath, count in ((1, 2), (2, 3)):
+        own = sorted((each for each in pieces if each.lath == lath), key=lambda each: each.part)
+        assert [each.part for each in own] == list(range(1, count + 1))
+        ends = [0.0, *np.cumsum([each.length for each in own])]
+        assert [each.start for each in own] == pytest.approx(ends[:-1])
+        assert ends[-1] == pytest.approx(7.0)
+    assert set(lath_names(nesting.cut(grid_of(7.0), stock=4.0, kerf=0.0)).values()) == {""}
 
 
 def test_rods_of_which_both_laths_must_be_spliced_in_one_place_are_told():

@@ -20,9 +20,11 @@ from shellform.gridshell.reactions import reactions
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import nesting, schedules
 from shellform.output.workshop.cable_forces import force_notes
+from shellform.output.workshop.directions import edge_away, rods_away
 from shellform.output.workshop.setting_out import elevations, support_plan
 from shellform.site.measurements import read_places
 from shellform.structure.elements.sections import Material, Rectangle
+from shellform.structure.elements.state import moved
 
 
 @pytest.fixture(scope="module")
@@ -395,20 +397,43 @@ def test_tables_and_states_that_do_not_fit_are_refused(built):
         replace(built, states={"design": built.hung})
 
 
-def test_each_support_s_bearing_and_rise_lead_along_its_rod_into_the_shell(built):
+def test_each_support_s_bearing_and_rise_are_those_of_its_rod_s_tangent_there(built):
     table, place = schedules.supports(built), built.shell.target.positions
     bearing, rise = (
         np.array(table.column(f"{name} of the rod [rad]"), dtype=float) for name in ("bearing", "rise")
     )
     feet = np.column_stack([table.column(f"{axis} [m]") for axis in "xyz"]).astype(float)
     leads = np.column_stack([np.cos(rise) * np.cos(bearing), np.cos(rise) * np.sin(bearing), np.sin(rise)])
+    off, off_chord = [], []
     for name, foot, lead in zip(table.column("rod"), feet, leads, strict=True):
         nodes = place[built.grid.rods[int(name[1:])].nodes]
-        away = nodes - foot
-        apart = np.linalg.norm(away, axis=1)
-        beside = np.argsort(apart)[1]  # the rod's node next to the foot
-        np.testing.assert_allclose(lead, away[beside] / apart[beside], atol=1e-9)
+        nodes = nodes if np.allclose(nodes[0], foot) else nodes[::-1]
+        arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1)))
+        tangent = np.array([np.polyfit(arc[:4], nodes[:4, axis], 3)[-2] for axis in range(3)])
+        off.append(np.linalg.norm(lead - tangent / np.linalg.norm(tangent)))
+        off_chord.append(np.linalg.norm(lead - (nodes[1] - nodes[0]) / arc[1]))
+    assert max(off) < 0.4 * max(off_chord)
     assert (rise > 0.0).all()
+
+
+def test_it_is_told_how_much_rods_turn_in_their_supports(built):
+    net, target = built.shell.net, built.shell.target
+    across = np.cross(rods_away(net, target)[int(net.supports[5])], [0.0, 0.0, 1.0])
+    turn = np.zeros((len(target.positions), 6))
+    turn[net.supports[5], 3:] = np.radians(3.0) * across / np.linalg.norm(across)
+    told = replace(built, states={**built.states, "none": target, "design": moved(target, turn)})
+    (note,) = [each for each in schedules.supports(told).notes if "turn in their supports" in each]
+    assert "erected up to 0.0°" in note
+    assert "design up to 3.0° (S5)" in note
+
+
+def test_an_edge_beam_leaves_its_foot_along_the_parabola_through_its_first_nodes():
+    along = np.array([0.0, 0.1, 0.25, 0.3])
+    curve = np.column_stack([along, 0.2 * along, 0.5 * along - 0.8 * along**2])
+    lead = edge_away(curve)
+    tangent = np.array([1.0, 0.2, 0.5]) / np.linalg.norm([1.0, 0.2, 0.5])
+    assert np.linalg.norm(lead - tangent) < 0.15 * np.linalg.norm(edge_away(curve[:2]) - tangent)
+    assert edge_away(curve[:2]) == pytest.approx(curve[1] / np.linalg.norm(curve[1]))
 
 
 def test_each_piece_begins_a_saw_cut_after_the_one_before_it(built):
@@ -581,10 +606,15 @@ def test_a_rod_s_line_tells_its_mass_its_bars_and_its_parts(density, layers):
     built = SimpleNamespace(
         shell=SimpleNamespace(rod=rod), design=SimpleNamespace(radius=0.02), grid=SimpleNamespace(rods=rods)
     )
-    pieces = (
+    pieces = [
         [nesting.Piece(1, 2, 2, 5.0, 2.0), nesting.Piece(0, 1, 1, 0.0, 3.0)],
         [nesting.Piece(1, 1, 2, 0.0, 5.0)],
-    )
+    ]
+    if layers == 2:
+        pieces += [
+            [nesting.Piece(1, 1, 2, 0.0, 2.0, 2), nesting.Piece(0, 1, 1, 0.0, 3.0, 2)],
+            [nesting.Piece(1, 2, 2, 2.0, 5.0, 2)],
+        ]
     cutting = nesting.Cutting(6.0, 0.003, tuple(nesting.Bar(tuple(each), 1.0) for each in pieces), 2)
     table = schedules.rods(built, cutting)
     whole, spliced = table.rows
@@ -592,8 +622,18 @@ def test_a_rod_s_line_tells_its_mass_its_bars_and_its_parts(density, layers):
     assert (whole[4], spliced[4]) == (
         (None, None) if density == 0.0 else pytest.approx((layers * 2.415, layers * 5.635))
     )
-    assert whole[5:] == (2, "250.0 2500.0", "4 1", "B1", "")
-    assert spliced[5:] == (3, "1000.0 3000.0 6500.0", "0 1 2", "part 1: B2, part 2: B1", "spliced")
+    assert whole[5:] == (2, "250.0 2500.0", "4 1", "B1" if layers == 1 else "B1, B3", "")
+    parts = (
+        "part 1: B2, part 2: B1"
+        if layers == 1
+        else "lath 1, part 1: B2, lath 1, part 2: B1, lath 2, part 1: B3, lath 2, part 2: B4"
+    )
+    assert spliced[5:] == (3, "1000.0 3000.0 6500.0", "0 1 2", parts, "spliced")
+    told = [row[3] for row in schedules.bars(built, cutting).rows]
+    if layers == 2:
+        assert told == ["lath 1, 2 of 2", "", "lath 1, 1 of 2", "lath 2, 1 of 2", "", "lath 2, 2 of 2"]
+    else:
+        assert told == ["2 of 2", "", "1 of 2"]
     assert ("Each rod is two laths" in " ".join(table.notes)) == (layers == 2)
     assert ("No masses" in " ".join(table.notes)) == (density == 0.0)
 

@@ -27,6 +27,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.output.pictures.curves import read_history as read_history
 from shellform.output.pictures.legend import Ramp, Word
+from shellform.output.pictures.letters import families
 from shellform.output.pictures.panel import FORMATS, Look
 from shellform.quantities import number
 from shellform.records.words import constraint_titles
@@ -169,7 +170,6 @@ def write_pages(path: str | Path, pages: Sequence[PaperPage], title: str = "") -
             "pdf.fonttype": 42,
             "svg.fonttype": "none",
             "svg.hashsalt": "shellform",
-            "font.family": "DejaVu Sans",
         }
     ):
         if target.suffix.lower() != ".pdf":
@@ -206,7 +206,7 @@ def _page(page: PaperPage) -> Figure:
             *label.place, label.text, fontsize=label.height / _CAPITAL / _INCH * _POINTS, color=label.colour,
             rotation=label.angle,
             ha="center" if label.side == "middle" else label.side, va=vertical[label.foot],
-            rotation_mode="anchor",
+            rotation_mode="anchor", fontfamily=families(label.text),
             fontweight="bold" if label.bold else "normal",
         )  # fmt: skip
     return figure

@@ -21,6 +21,7 @@ from ezdxf.enums import TextEntityAlignment
 from ezdxf.layouts import Modelspace
 
 import shellform
+from shellform.output.pictures.letters import columns, without_font
 from shellform.output.pictures.plots import Label, PaperLine, PaperPage, write_pages
 from shellform.output.workshop import layout, setting_out
 from shellform.output.workshop.marks import PENS, WIDE, Mark, Ring, Sheet, Span, Stroke, Words
@@ -64,6 +65,18 @@ def write_drawings(folder: str | Path, built: Built, cutting: Cutting) -> list[P
             ]
         write_pdf(files[-1], pages, built)
     return files
+
+
+def letters_note(built: Built) -> tuple[str, ...]:
+    """What the PDF sheets show as boxes, since no font here has it, a sentence; nothing where all is set."""
+    block = built.block
+    boxes = without_font("".join((built.title, built.name, block.date, block.revision, block.author)))
+    if not boxes:
+        return ()
+    return (
+        f"No font of this machine has the letters {boxes}, which are boxes on the PDF drawings: install one (Noto Sans CJK has "
+        "Chinese, Japanese and Korean ones), delete drawings/ and give the same command again.",
+    )
 
 
 def write_dxf(path: str | Path, sheet: Sheet, built: Built | None = None) -> Path:
@@ -290,7 +303,7 @@ class _Column:
         line = ""
         for word in [*text.split(), ""]:
             longer = f"{line} {word}".strip()
-            if line and (not word or len(longer) * (_BOLD if bold else _PROSE) * height > self.width):
+            if line and (not word or columns(longer) * (_BOLD if bold else _PROSE) * height > self.width):
                 self.labels.append(Label((self.left, self.top - height), height, line, bold=bold))
                 self.top -= 1.6 * height
                 longer = word
@@ -348,7 +361,7 @@ def _title_block(
     labels = []
     for head, text, x, y, height in fields:
         room = (right if x == middle or head == "job" else middle) - x - 4.0
-        size = min(height, room / (_PROSE * max(len(text), 1)))
+        size = min(height, room / (_PROSE * max(columns(text), 1.0)))
         labels += [
             Label((x + 2.0, y - 3.2), 1.6, head, colour="#5a5a5a"),
             Label((x + 2.0, y - 8.2), size, text),

@@ -37,7 +37,7 @@ _EQUAL = 1e-9  # m: what a length may exceed the stock by
 @dataclass(frozen=True)
 class Piece:
     """A piece of rod number `rod`, from `start` on over `length`, m, along the rod; `part` (from 1) of the
-    rod's `parts`.
+    `parts` of its `lath` (from 1).
     """
 
     rod: int
@@ -45,6 +45,7 @@ class Piece:
     parts: int
     start: float
     length: float
+    lath: int = 1
 
 
 @dataclass(frozen=True)
@@ -99,13 +100,13 @@ def cut(grid: Grid, *, stock: float = STOCK, kerf: float = KERF, laths: int = 1)
     spliced = 0
     for number, rod in enumerate(grid.rods):
         taken: list[float] = []
-        for _ in range(laths):
+        for lath in range(1, laths + 1):
             cuts = [] if rod.length <= stock + _EQUAL else _splices(rod, stock, spliced % 2 == 1, taken)
             spliced += bool(cuts)
             taken += cuts
             ends = [0.0, *cuts, rod.length]
             pieces += [
-                Piece(number, k + 1, len(ends) - 1, a, b - a) for k, (a, b) in enumerate(pairwise(ends))
+                Piece(number, k + 1, len(ends) - 1, a, b - a, lath) for k, (a, b) in enumerate(pairwise(ends))
             ]
     needed = {k: piece.length + kerf for k, piece in enumerate(pieces)}
     room = stock + kerf + 2.0 * _EQUAL

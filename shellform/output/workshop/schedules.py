@@ -42,9 +42,10 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.grid import Grid, rod_names
 from shellform.output.workshop.block_schedule import block_table
 from shellform.output.workshop.cable_forces import force_notes
-from shellform.output.workshop.edge_schedule import edge_names, edge_table
+from shellform.output.workshop.directions import away, turning_note
+from shellform.output.workshop.edge_schedule import edge_table
 from shellform.output.workshop.nesting import Cutting
-from shellform.output.workshop.splice_schedule import cutting_notes, splice_table
+from shellform.output.workshop.splice_schedule import cutting_notes, lath_names, splice_table
 from shellform.output.workshop.turnbuckles import cutting_note, turnbuckle_notes
 from shellform.quantities import newtons
 from shellform.structure.elements.sections import mass_per_length
@@ -114,16 +115,17 @@ def rods(built: Built, cutting: Cutting) -> Table:
     """The rods: lengths, marks, section, mass, and from which bars they are cut."""
     section = built.shell.rod.resized(built.design.radius).section
     weight = mass_per_length(section)
-    places: dict[int, list[tuple[int, str]]] = {}
+    places: dict[int, list[tuple[int, int, str]]] = {}
+    of_lath = lath_names(cutting)
     for number, bar in enumerate(cutting.bars, 1):
         for piece in bar.pieces:
-            said = f"B{number}" if piece.parts == 1 else f"part {piece.part}: B{number}"
-            places.setdefault(piece.rod, []).append((piece.part, said))
+            said = f"B{number}" if piece.parts == 1 else f"{of_lath[piece.lath]}part {piece.part}: B{number}"
+            places.setdefault(piece.rod, []).append((piece.lath, piece.part, said))
     rows = tuple(
         (
             name, rod.direction, rod.length, label(section, 2), weight * rod.length if weight else None,
             len(rod.marks), " ".join(f"{1e3 * mark:.1f}" for mark in rod.marks),
-            " ".join(map(str, rod.crossings.tolist())), ", ".join(said for _, said in sorted(places[k])),
+            " ".join(map(str, rod.crossings.tolist())), ", ".join(said for _, _, said in sorted(places[k])),
             "spliced" if k in cutting.spliced else "",
         )
         for k, (name, rod) in enumerate(zip(rod_names(built.grid), built.grid.rods, strict=True))
@@ -165,12 +167,12 @@ def marks(built: Built) -> Table:
 
 def bars(built: Built, cutting: Cutting) -> Table:
     """One row a piece: which bar it is cut from, in which order, and the bar's offcut after the last one."""
-    names = rod_names(built.grid)
+    names, of_lath = rod_names(built.grid), lath_names(cutting)
     rows = []
     for number, bar in enumerate(cutting.bars, 1):
         at = 0.0
         for place, piece in enumerate(bar.pieces, 1):
-            part = "" if piece.parts == 1 else f"{piece.part} of {piece.parts}"
+            part = "" if piece.parts == 1 else f"{of_lath[piece.lath]}{piece.part} of {piece.parts}"
             last = bar.offcut if place == len(bar.pieces) else None
             rows.append((f"B{number}", place, names[piece.rod], part, piece.length, at, piece.start, last))
             at += piece.length + cutting.kerf
@@ -293,22 +295,13 @@ def support_forces(built: Built) -> dict[str, Reals]:
 
 
 def supports(built: Built) -> Table:
-    """The supports: which end of which rod, where its axis stands, how it leaves the ground: bearing from x
-    and rise, rad; and which force acts on it at each load."""
-    grid, place = built.grid, built.shell.target.positions
-    ends = {
-        int(rod.nodes[side]): (name, word, place[rod.nodes[inner]] - place[rod.nodes[side]])
-        for name, rod in zip(rod_names(grid), grid.rods, strict=True)
-        for side, inner, word in ((0, 1, "first"), (-1, -2, "second"))
-    }
-    for name, line in zip(edge_names(built.shell.net), built.shell.net.edges, strict=True):
-        for tip, inner, word in ((0, 1, "first"), (-1, -2, "second")):
-            foot, following = (int(node) for node in line.nodes[[tip, inner]])
-            names, words, along = ends.get(foot, ("", "", place[following] - place[foot]))
-            ends[foot] = f"{names}, {name}" if names else name, f"{words}, {word}" if words else word, along
+    """The supports: which end of which rod, where its axis stands, how it leaves the ground there: bearing
+    from x and rise of its tangent, rad; and which force acts on it at each load."""
+    net, place = built.shell.net, built.shell.target.positions
+    ends = away(net, net.target)
     pushes = support_forces(built)
     rows, clashes = [], clashing_supports(built)
-    for support, node in enumerate(built.shell.net.supports.tolist()):
+    for support, node in enumerate(net.supports.tolist()):
         rod, side, along = ends[node]
         x, y, z = place[node].tolist()
         bearing = float(np.arctan2(along[1], along[0]))
@@ -323,8 +316,10 @@ def supports(built: Built) -> Table:
     heads += [f"{_stage(name)}: on the support along {axis} [N]" for name in pushes for axis in "xyz"]
     notes = (
         "Supports stand where they are: before, during and after the pour. Forces are those of the rods' ends on them, "
-        "at the feet of edge beams (E0, E1, …) those of the beams, with the load that stands on the support itself. Of beams that "
-        "meet in one the direction is the first one's.",
+        "at the feet of edge beams (E0, E1, …) those of the beams, with the load that stands on the support itself.",
+        "Bearing, from x towards y, and rise are those of the axis' tangent at the support in the wanted shape; of beams that meet "
+        "in one, the first one's.",
+        *turning_note(net, _told_states(built)),
         f"Supports whose axes are nearer than {1e3 * shoe_width(built):.3g} mm, the width of a shoe (three rod "
         "diameters), clash: "
         + (", ".join(f"S{a} and S{b}, {1e3 * apart:.1f} mm" for a, b, apart in clashes) or "none")

@@ -38,6 +38,13 @@ def cutting_notes(cutting: Cutting, names: list[str]) -> tuple[str, ...]:
     return tuple(said)
 
 
+def lath_names(cutting: Cutting) -> dict[int, str]:
+    """What is said before a part by the number of its lath: the parts of both laths of a rod are of other
+    lengths; nothing where rods are of one."""
+    laths = sorted({piece.lath for bar in cutting.bars for piece in bar.pieces})
+    return {lath: f"lath {lath}, " if len(laths) > 1 else "" for lath in laths}
+
+
 def splice_table(
     shell: Gridshell, design: Design, states: Mapping[str, State], rods: Sequence[str], cutting: Cutting
 ) -> Table:
