@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.case.case import load_case
 from shellform.output.workshop.schedules import Built
-from shellform.run.run import run_case
 from shellform.structure.elements.state import State
+from tests.run.small_run import begin
 
 ROOT = Path(__file__).parent.parent
 
@@ -71,5 +70,4 @@ def built(shell):
 def begun(tmp_path_factory):
     """A run left after its initial design, made once for all tests of run folders."""
     folder = tmp_path_factory.mktemp("begun") / "run"
-    run_case(load_case(ROOT / "scripts/scale_model.toml"), folder, until="initial")
-    return folder
+    return begin(ROOT, folder)

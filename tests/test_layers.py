@@ -270,6 +270,16 @@ def test_designing_does_not_wait_for_scipys_statistics():
     assert result.stdout.strip() == "False"
 
 
+def test_a_process_that_reads_a_surface_file_loads_no_scipy():
+    readers = "foreign, compas_surfaces, gltf, meshes, ply, rhino, vtkfiles"
+    code = (
+        f"import sys, shellform.surface.cad; from shellform.surface.readers import {readers}; "
+        "print('scipy' in sys.modules)"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "False"
+
+
 def test_no_module_is_longer_than_a_reader_can_hold():
     length = {
         path.relative_to(PACKAGE).as_posix(): len(path.read_text(encoding="utf-8").splitlines())

@@ -349,24 +349,19 @@ def test_ctrl_c_within_compiled_code_stops_as_anywhere_else(monkeypatch, capsys)
 
 def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
     run = tmp_path / "run"
-    arguments = [
-        "design",
-        "scripts/scale_model.toml",
-        "--output",
-        run,
-        "--set",
+    arguments = ["design", "scripts/scale_model.toml", "--output", run]
+    for setting in (
+        "surface.size=0.02",
+        "net.spacing=0.08",
         "net.elements=2",
-        "--set",
+        "load.force=5.0",
         "optimise.evaluations=5",
-        "--set",
         "optimise.polish=3",
-        "--set",
         "safety.required=false",
-        "--set",
         "safety.drawn=4",
-        "--set",
         "safety.compared=2",
-    ]
+    ):
+        arguments += ["--set", setting]
     result = shellform(*arguments)
     assert result.returncode == 0, result.stderr
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))

@@ -38,6 +38,12 @@ def umbrella():
     )
 
 
+@pytest.fixture(scope="module")
+def tighter(umbrella):
+    """Its net, off the creases at the first attempt."""
+    return climbed_net(umbrella, SETTINGS, angle=math.pi / 4)[0]
+
+
 def test_where_the_first_attempt_succeeds_nothing_is_changed():
     surface, settings = bowl(), NetSettings(spacing=0.25, gap=0.005, elements=2)
     plain = sf.pull_net(surface, spacing=0.25, gap=0.005, elements=2, angle=0.3)
@@ -65,7 +71,7 @@ def test_no_further_rung_is_climbed_once_failed_pulls_took_what_they_may(umbrell
         climbed_net(umbrella, SETTINGS, angle=math.pi / 4, failed=known, most=100)
 
 
-def test_a_net_that_stays_off_creases_is_pulled_tighter_and_says_so(umbrella, tmp_path):
+def test_a_net_that_stays_off_creases_is_pulled_tighter_and_says_so(umbrella, tighter, tmp_path):
     with pytest.raises(NoNet) as caught:
         net_at(umbrella, SETTINGS, angle=math.pi / 4)
     assert caught.value.reason is Reason.OFF
@@ -81,8 +87,7 @@ def test_a_net_that_stays_off_creases_is_pulled_tighter_and_says_so(umbrella, tm
     assert net.attempts[0].sentence() in said
     save_net(tmp_path / "net.npz", net)
     assert load_net(tmp_path / "net.npz").attempts == net.attempts
-    again, _ = climbed_net(umbrella, SETTINGS, angle=math.pi / 4)
-    assert (again.target.positions == net.target.positions).all()
+    assert (tighter.target.positions == net.target.positions).all()
 
 
 def test_a_surface_that_takes_no_net_is_refused_with_all_that_was_tried():
@@ -188,9 +193,10 @@ def test_a_corrugated_barrel_is_covered_at_an_angle_where_rods_run_far_past_its_
     assert net.quality.uncovered_area < 0.01 * surface.area
 
 
-def test_a_net_that_creases_bring_nearer_than_its_spacing_says_so_and_is_none_where_none_may_be(umbrella):
-    net, _ = climbed_net(umbrella, SETTINGS, angle=math.pi / 4)
-    (told,) = (note.text for note in net.notes if note.kind is NoteKind.NEAR)
+def test_a_net_that_creases_bring_nearer_than_its_spacing_says_so_and_is_none_where_none_may_be(
+    umbrella, tighter
+):
+    (told,) = (note.text for note in tighter.notes if note.kind is NoteKind.NEAR)
     assert "nearer than their spacing" in told
     with pytest.raises(NoNet, match="nearer than their spacing"):
         climbed_net(umbrella, SETTINGS, angle=math.pi / 4, near=False)

@@ -46,8 +46,8 @@ def browser():
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return finish(begin(ROOT, tmp_path_factory.mktemp("browsed") / "run"))
+def folder(begun, tmp_path_factory):
+    return finish(Path(shutil.copytree(begun, tmp_path_factory.mktemp("browsed") / "run")))
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import io
 import json
+import shutil
 from html import unescape
 from pathlib import Path
 
@@ -12,15 +13,13 @@ from PIL import Image
 
 import shellform as sf
 from shellform.run.folder import read_run
-from tests.run.small_run import begin, finish
-
-ROOT = Path(__file__).parent.parent.parent
+from tests.run.small_run import finish
 
 
 @pytest.fixture(scope="module")
-def shown(tmp_path_factory):
+def shown(begun, tmp_path_factory):
     """A finished run, and what IPython would display of it by kind."""
-    run = read_run(finish(begin(ROOT, tmp_path_factory.mktemp("displayed") / "run")))
+    run = read_run(finish(Path(shutil.copytree(begun, tmp_path_factory.mktemp("displayed") / "run"))))
     ipython = InteractiveShell()
     ipython.display_formatter.active_types = ["text/plain", "image/png", "text/html"]
     sf.load_ipython_extension(ipython)

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shellform.case.case import load_case
 from shellform.errors import InputError
 from shellform.records.progress import Event, unheard
 from shellform.run.folder import alone, read_run, refuse_overwriting
@@ -63,12 +62,12 @@ def test_a_run_of_a_newer_version_is_neither_read_nor_overwritten_but_with_fresh
     changed(copy / "summary.json", shellform="99.0")
     read_run(copy)  # its files are as ours
     with pytest.raises(InputError, match=r"holds a run of a newer shellform \(found '99.0'\).*--fresh"):
-        run_case(load_case(CASE), copy, until="surface")
+        run_case(small_case(ROOT), copy, until="surface")
     changed(copy / "summary.json", version=2)
-    for refused in (lambda: read_run(copy), lambda: run_case(load_case(CASE), copy, until="surface")):
+    for refused in (lambda: read_run(copy), lambda: run_case(small_case(ROOT), copy, until="surface")):
         with pytest.raises(InputError, match="was written by a newer shellform"):
             refused()
-    run_case(load_case(CASE), copy, until="surface", fresh=True)
+    run_case(small_case(ROOT), copy, until="surface", fresh=True)
     assert json.loads((copy / "summary.json").read_text(encoding="utf-8"))["version"] == 1
 
 
@@ -97,7 +96,7 @@ def test_what_a_changed_case_will_find_anew_is_forgotten_before_it_is_computed(c
 
     monkeypatch.setattr(run, "gridshell", stopped)
     with pytest.raises(KeyboardInterrupt):
-        run_case(load_case(CASE, ["cable.stiffness=200.0"]), copy, until="initial")
+        run_case(small_case(ROOT, "cable.stiffness=200.0"), copy, until="initial")
     assert set(json.loads((copy / "stages.json").read_text(encoding="utf-8"))) == {"surface", "net"}
     with pytest.raises(InputError, match="no designs yet"):
         read_run(copy)
@@ -111,14 +110,14 @@ def test_files_that_shellform_did_not_write_are_not_overwritten_without_fresh(tm
     with pytest.raises(
         InputError, match=rf"is no run folder, and {name.split('/')[0]} in it would be overwritten.*--fresh"
     ):
-        run_case(load_case(CASE), tmp_path, until="surface")
+        run_case(small_case(ROOT), tmp_path, until="surface")
     assert own.read_text(encoding="utf-8") == "{}"
-    run_case(load_case(CASE), tmp_path, until="surface", fresh=True)
+    run_case(small_case(ROOT), tmp_path, until="surface", fresh=True)
     assert "shellform-summary" in (tmp_path / "summary.json").read_text(encoding="utf-8")
 
 
 def test_two_runs_do_not_work_in_one_folder_and_the_lock_ends_with_its_holder(copy):
-    case = load_case(CASE)
+    case = small_case(ROOT)
     with alone(copy):
         for refused in (
             lambda: run_case(case, copy, until="surface"),
@@ -135,7 +134,7 @@ def test_what_killed_writers_left_is_cleared_away_by_the_next_run(copy):
     left = [copy / "net.part-0123456789abcdef.npz", copy / "figures/deviations.part-0123456789abcdef.png"]
     for file in left:
         file.touch()
-    run_case(load_case(CASE), copy, until="surface")
+    run_case(small_case(ROOT), copy, until="surface")
     assert not any(file.exists() for file in left)
     assert (copy / "net.npz").is_file()
 
@@ -152,8 +151,8 @@ def test_symbolic_links_in_a_run_folder_lead_nobody_elsewhere(copy, tmp_path, na
         (copy / name).unlink(missing_ok=True)
         (copy / name).symlink_to(outside / "mine.txt")
     for refused in (
-        lambda: run_case(load_case(CASE), copy, until="surface"),
-        lambda: run_case(load_case(CASE), copy, until="surface", fresh=True),
+        lambda: run_case(small_case(ROOT), copy, until="surface"),
+        lambda: run_case(small_case(ROOT), copy, until="surface", fresh=True),
         lambda: read_run(copy),
         lambda: write_report([copy]),
     ):
@@ -190,7 +189,7 @@ def test_the_net_alone_does_not_go_into_a_design_s_run(copy):
 def test_folders_that_cannot_be_written_are_told(tmp_path):
     for place in ("/proc/shellform/run", "/dev/null/run"):
         with pytest.raises(InputError, match="can't be written"):
-            run_case(load_case(CASE), Path(place), until="surface")
+            run_case(small_case(ROOT), Path(place), until="surface")
 
 
 def test_a_disc_that_fills_up_is_told_in_one_line_and_leaves_no_broken_file(tmp_path):

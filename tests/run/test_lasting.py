@@ -10,13 +10,13 @@ from shellform.records.summary import Summary, read_summary
 from shellform.run.lasting import lasting
 from shellform.run.run import run_case
 from tests.command import ROOT
-from tests.run.small_run import begin, finish, small_case
+from tests.run.small_run import finish, small_case
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def whole(begun, tmp_path_factory):
     """A run in whose place every stage left something."""
-    folder = finish(begin(ROOT, tmp_path_factory.mktemp("whole") / "run"))
+    folder = finish(Path(shutil.copytree(begun, tmp_path_factory.mktemp("whole") / "run")))
     names = [f"figures/net-{each}.png" for each in ("distance", "curvature", "skew", "springs")]
     names += [f"figures/{each}.png" for each in ("deviations", "objective", "constraints")]
     for design in ("unbraced", "initial", "optimised"):
@@ -79,18 +79,13 @@ def test_where_nothing_was_done_nothing_is_missing(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["surface.npz", "net.npz", "designs/initial.npz"])
-def test_run_again_the_deleted_file_is_there_with_the_same_bytes(begun_small, tmp_path, name):
+def test_run_again_the_deleted_file_is_there_with_the_same_bytes(begun, tmp_path, name):
     """It was told "kept", or that the run is unfinished and goes on by the very command that said so."""
-    copy = Path(shutil.copytree(begun_small, tmp_path / "run"))
+    copy = Path(shutil.copytree(begun, tmp_path / "run"))
     (copy / name).unlink()
     told = []
     run_case(small_case(ROOT), copy, until="initial", report=told.append)
-    assert (copy / name).read_bytes() == (begun_small / name).read_bytes()
+    assert (copy / name).read_bytes() == (begun / name).read_bytes()
     stage = {"surface.npz": "surface", "net.npz": "net", "designs/initial.npz": "initial"}[name]
     kept = [event.stage for event in told if event.kind.value == "kept"]
     assert kept == list(STAGES[: STAGES.index(stage)])
-
-
-@pytest.fixture(scope="module")
-def begun_small(tmp_path_factory):
-    return begin(ROOT, tmp_path_factory.mktemp("small") / "run")

@@ -22,13 +22,13 @@ from shellform.run.run import run_case
 from tests.stubs import CASE
 
 ROOT = Path(__file__).parent.parent.parent
-FEW = ["safety.drawn=4", "safety.compared=2"]
+PLAIN = ["safety.required=false", "cable.without=false", "optimise.unloaded=false"]  # one design, by itself
 
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     place = tmp_path_factory.mktemp("again") / "dome.toml"
-    place.write_text(CASE, encoding="utf-8")
+    place.write_text(f"{CASE}[safety]\ndrawn = 4\ncompared = 2\n", encoding="utf-8")
     return place
 
 
@@ -46,7 +46,7 @@ def undrawn(monkeypatch):
 
 
 def test_a_design_that_is_not_asked_for_again_is_gone_with_all_its_pictures(file, tmp_path):
-    run_case(load_case(file, ["optimise.polish=2"]), tmp_path, until="optimise")
+    run_case(load_case(file, [*PLAIN, "optimise.polish=2"]), tmp_path, until="optimise")
     assert read_run(tmp_path).best == "polished"
     for name in (
         "mode-polished-design.png",
@@ -55,7 +55,7 @@ def test_a_design_that_is_not_asked_for_again_is_gone_with_all_its_pictures(file
         "initial-design.png",
     ):
         (tmp_path / "figures" / name).write_bytes(b"drawn")
-    run_case(load_case(file), tmp_path, until="optimise")
+    run_case(load_case(file, PLAIN), tmp_path, until="optimise")
     assert read_run(tmp_path).best == "optimised"
     assert not list(tmp_path.rglob("*polished*"))
     assert (tmp_path / "figures/initial-design.png").is_file()
@@ -80,7 +80,7 @@ def test_a_net_that_is_kept_is_told_with_the_rods_of_the_case_as_it_is(file, tmp
 def test_wishes_for_cables_are_kept_and_told_in_summary_schedule_and_page(file, tmp_path, undrawn):
     most = 80
     wishes = [f"optimise.cables_max={most}", "optimise.symmetric=true", "optimise.polish=2"]
-    case = load_case(file, [*wishes, "cable.adjustment=0.004", *FEW])
+    case = load_case(file, [*wishes, "cable.adjustment=0.004"])
     summary = run_case(case, tmp_path, until="optimise")
     found = summary.optimisation
     cables = summary.designs["polished"].cables
@@ -105,13 +105,13 @@ def test_wishes_for_cables_are_kept_and_told_in_summary_schedule_and_page(file, 
     assert "Symmetric cables have one length" in page
     assert f"cut to {told.cut_lengths} different lengths" in page
     before = listed(tmp_path)
-    run_case(load_case(file, [*wishes, *FEW]), tmp_path, until="initial")
+    run_case(load_case(file, wishes), tmp_path, until="initial")
     assert listed(tmp_path)["optimise"] == before["optimise"], "no design depends on the turnbuckles' range"
 
 
 def test_a_number_of_cables_that_cannot_be_reached_is_said(file, tmp_path):
     lines = []
-    case = load_case(file, ["optimise.cables_max=1"])
+    case = load_case(file, [*PLAIN, "optimise.cables_max=1"])
     summary = run_case(case, tmp_path, until="optimise", report=lambda event: lines.append(event.text))
     found = summary.optimisation.cables_max
     assert found.kept is False
@@ -148,11 +148,11 @@ def test_a_stage_that_fails_leaves_the_others_to_be_made_and_is_made_by_the_next
     with monkeypatch.context() as broken:
         broken.setattr(run, f"_{stage}", failing)
         with pytest.raises(InputError, match="is full"):
-            run_case(load_case(file, FEW), tmp_path)
+            run_case(load_case(file), tmp_path)
     assert set(listed(tmp_path)) == set(STAGES) - {stage}
     assert read_run(tmp_path).summary.failed == {stage: f"{stage}: is full"}
     assert f"The stage “{stage}” failed" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    run_case(load_case(file, FEW), tmp_path)
+    run_case(load_case(file), tmp_path)
     assert set(listed(tmp_path)) == set(STAGES)
     assert not read_run(tmp_path).summary.failed
 
@@ -182,7 +182,7 @@ def test_an_optimisation_broken_off_goes_on_from_its_checkpoint_to_the_same_byte
 
 
 def test_a_fresh_run_takes_no_checkpoint_up(file, tmp_path):
-    case = load_case(file, ["optimise.evaluations=8"])
+    case = load_case(file, [*PLAIN, "optimise.evaluations=8"])
 
     def stop(event):
         if event.text.startswith("evaluation 4/"):
@@ -212,6 +212,8 @@ def test_a_design_has_the_same_bytes_on_one_core_and_on_two(tmp_path):
         "optimise.polish=0",
         "optimise.unloaded=false",
         "cable.without=false",
+        "safety.drawn=2",
+        "safety.compared=2",
     ]
     made = []
     for threads in ("1", "2"):

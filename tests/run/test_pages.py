@@ -12,14 +12,7 @@ from shellform.errors import InputError
 from shellform.records.summary import read_summary, write_summary
 from shellform.run.folder import read_run
 from shellform.run.pages import shown_run, write_report
-from tests.run.small_run import begin, finish
-
-ROOT = Path(__file__).parent.parent.parent
-
-
-@pytest.fixture(scope="module")
-def begun(tmp_path_factory):
-    return begin(ROOT, tmp_path_factory.mktemp("begun") / "run")
+from tests.run.small_run import finish
 
 
 @pytest.fixture(scope="module")

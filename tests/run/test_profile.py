@@ -10,17 +10,17 @@ from shellform.records.profile import Profile, read_profile
 from shellform.records.stages import read_stages
 from shellform.run.pages import write_report
 from shellform.run.run import run_case
-from tests.run.small_run import begin, small_case
+from tests.run.small_run import small_case
 
 ROOT = Path(__file__).parent.parent.parent
 SAME = ("surface.npz", "net.npz", "net.json", "case.toml", "stages.json", "designs/initial.npz")
 
 
 @pytest.fixture(scope="module")
-def both(tmp_path_factory):
+def both(begun, tmp_path_factory):
     place = tmp_path_factory.mktemp("both")
     run_case(small_case(ROOT), place / "profiled", until="initial", profile=True)
-    return begin(ROOT, place / "plain"), place / "profiled"
+    return begun, place / "profiled"
 
 
 def test_results_are_the_same_bytes_with_a_profile_and_without(both):

@@ -3,6 +3,7 @@ stand-ins for what these programs bring."""
 
 import json
 import math
+import shutil
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -15,14 +16,11 @@ from shellform.output.exchange import vtp
 from shellform.output.exchange.run_readers import PROGRAMS, reader, write_readers
 from shellform.problem.paths import deviations
 from shellform.run.folder import read_run
-from tests.run.small_run import begin
-
-ROOT = Path(__file__).parent.parent.parent
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return begin(ROOT, tmp_path_factory.mktemp("read") / "run")
+def folder(begun, tmp_path_factory):
+    return Path(shutil.copytree(begun, tmp_path_factory.mktemp("read") / "run"))
 
 
 def ran(program, **names):

@@ -1,8 +1,8 @@
 """Readers of foreign libraries and of nested formats, and builder scripts, in a process of their own, so that
 a crash, a hang or a flood of memory in them becomes a message.
 
-The child imports one reader (gmsh, rhino3dm, meshio, plyfile or VTK; 0.3 to 0.7 s), reads, and hands its
-arrays back through a pipe: no file is needed for that.
+The child imports one reader (gmsh, rhino3dm, meshio, plyfile or VTK; 0.3 to 0.5 s) and no SciPy, which would
+take as long, reads, and hands its arrays back through a pipe: no file is needed for that.
 """
 
 from __future__ import annotations

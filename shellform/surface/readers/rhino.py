@@ -20,7 +20,6 @@ from uuid import UUID, uuid5
 
 import numpy as np
 import rhino3dm
-from scipy.interpolate import make_interp_spline
 
 from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError
@@ -92,6 +91,8 @@ def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -
 def _through(points: Reals) -> Any:
     """The cubic spline through the points over the chords' length, without a kink at its second and its last
     but one point (de Boor 1978), as a NURBS curve; of less degree where there are fewer than four."""
+    from scipy.interpolate import make_interp_spline  # whose loading takes longer than reading most files
+
     if len(points) == 2:
         return rhino3dm.LineCurve(*(rhino3dm.Point3d(*point) for point in points.tolist()))
     degree = min(3, len(points) - 1)

@@ -4,10 +4,14 @@ they have.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import scipy.sparse as sp
 
 from shellform.arrays import Flags, Indices, Reals
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
 
 
 def area_vectors(points: Reals, triangles: Indices) -> Reals:
@@ -50,6 +54,8 @@ def open_edges(triangles: Indices) -> Indices:
 
 def adjacency(triangles: Indices, count: int) -> sp.csr_array:
     """1 (v, v) for each two of `count` points that an edge joins."""
+    import scipy.sparse as sp  # half of what a reader's process would load, which asks for none
+
     edges = directed_edges(triangles)
     graph = sp.csr_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
     return sp.csr_array((graph + graph.T) > 0).astype(float)
