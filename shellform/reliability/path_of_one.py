@@ -4,7 +4,7 @@ method).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import cast
@@ -223,15 +223,17 @@ class Loading(Branch):
         begin: tuple[float, State] | None = None,
         marks: Sequence[float] = (),
         heeding: bool = False,
+        enough: Callable[[float, Here], bool] | None = None,
     ) -> tuple[Here | None, float]:
         """The last state on the stable branch and its load factor, `most` where the branch goes on; None
         where there is no unloaded state. With `begin` from a state at a load factor that is known to lie on
         the branch. The end is known to the `smallest` step, but next to factors in `marks`, where it decides
-        whether a structure stands, to MARKED. `heeding` what steps may pass over (Branch.along)."""
+        whether a structure stands, to MARKED. `heeding` what steps may pass over, and where it has gone
+        far `enough`: Branch.along."""
         factor, here = (0.0, self._unloaded()) if begin is None else (begin[0], self.at(begin[1]))
         if here is None:
             return None, factor
-        here, factor = self.along(here, factor, most, step, smallest, heeding=heeding)
+        here, factor = self.along(here, factor, most, step, smallest, heeding=heeding, enough=enough)
         for mark in sorted(marks):
             if factor < mark <= min(factor + 2.0 * smallest, most):
                 finest = min(MARKED, smallest)
