@@ -248,7 +248,7 @@ def aimed(problem: Problem, least: float, mind: FactorsAsBuilt | None) -> Proble
 def restiffened(search: Search, it: Iterate, least: float) -> Iterate:
     """With another stiffness, N/m, to keep; the window begins anew."""
     search.evaluator.problem = aimed(search.inner, least, it.mind)
-    point = search.evaluator.seed(it.point.design, it.point.states, it.stage)
+    point = search.evaluator.seed(it.point.design, it.point.states, it.stage, before=it.point)
     excess = np.zeros(len(point.constraints))
     return replace(it, stiffness=least, point=point, excess=excess, window=search.first_window)
 

@@ -49,7 +49,6 @@ _KNOWN = 16  # measurements of terms that need no equilibrium, which are kept
 # of an Evaluator's work: `factorisations` are those of its equilibria
 COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
 
-
 Made = TypeVar("Made")
 
 
@@ -148,14 +147,22 @@ class Evaluator:
         first = self.problem.design_load.force
         return np.asarray(first + stage * (self.problem.loads[name] - first))
 
-    def seed(self, design: Design, states: Mapping[str, State], stage: float) -> Evaluated:
-        """The values of a design whose equilibria `states` at the stage are known. Raises OffBranch where a
-        term can't be measured, InputError where one of the start is no number.
-        """
+    def seed(
+        self, design: Design, states: Mapping[str, State], stage: float, *, before: Evaluated | None = None
+    ) -> Evaluated:
+        """The values of a design with known equilibria `states` at the stage; terms measured in them for the
+        problem as it was `before` aren't again. Raises OffBranch where a term can't be measured, InputError
+        where one of the start is no number."""
+        known = dict[int, Measurement]()
+        if before is not None and before.stage == stage:
+            known = dict(zip(map(id, before.problem.terms), before.measurements, strict=True))
         problem, assembly = self.problem, self.assembly(design)
         try:
             places = [self._at(term, design, states, stage, assembly) for term in problem.terms]
-            found = [self._measured(term, at) for term, at in zip(problem.terms, places, strict=True)]
+            found = [
+                known[id(term)] if id(term) in known else self._measured(term, at)
+                for term, at in zip(problem.terms, places, strict=True)
+            ]
         except NotANumber as error:
             if not self.evaluations:  # the start's: the term's own fault
                 raise

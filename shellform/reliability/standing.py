@@ -149,14 +149,19 @@ class Workshop:
 
         return self.with_structure(errors, ended)
 
-    def rests(self, errors: Errors, *, resolution: float, marks: Sequence[float] = ()) -> Limit:
+    def rests(
+        self, errors: Errors, *, resolution: float, marks: Sequence[float] = (), where: bool = True
+    ) -> Limit:
         """As `fall`, up to the whole load, but a structure that rests under it beside the perfect one
-        (path_of_one.py) isn't loaded from nothing."""
+        (path_of_one.py) isn't loaded from nothing; unless it is asked `where` one falls, its factor is only
+        on the right side of those in `marks` and of the whole load."""
 
         def ended(loading: Loading) -> Limit:
             here, factor = loading.beside(), 1.0
-            if here is None:
+            if here is None and where:
                 here, factor = loading.borne(1.0, STEP, resolution, marks=marks)
+            elif here is None:
+                here, factor = loading.told(marks, resolution)
             return self._ended(loading, here, factor, 1.0, tell=False)
 
         return self.with_structure(errors, ended)

@@ -122,7 +122,7 @@ def test_structures_kept_as_they_bear_ask_for_nothing_that_the_design_misses(sea
 def test_where_what_a_structure_bears_is_not_found_a_search_goes_on_as_it_was(searching, monkeypatch, mind):
     search, it, _ = searching
 
-    def lost(*_):
+    def lost(*_, **__):
         raise OffBranch("the load that structure 17 as built bears was not found")
 
     before = search.evaluator.problem

@@ -99,8 +99,8 @@ def test_windows_begin_in_mean_tensions_and_evaluations_are_counted_down():
 def test_with_another_stiffness_to_keep_a_search_forgets_what_trials_have_shown():
     search, seeded = search_of(), []
 
-    def seed(design, states, stage):
-        seeded.append((design, states, stage, list(search.evaluator.problem.constraints)))
+    def seed(design, states, stage, *, before):
+        seeded.append((design, states, stage, before, list(search.evaluator.problem.constraints)))
         return SimpleNamespace(constraints=np.ones(4))
 
     search.evaluator.seed = seed
@@ -108,7 +108,7 @@ def test_with_another_stiffness_to_keep_a_search_forgets_what_trials_have_shown(
     found = restiffened(search, begun, 3.0)
     assert (found.stiffness, found.window, found.excess.tolist()) == (3.0, pytest.approx(0.75), [0.0] * 4)
     ((*where, constraints),) = seeded
-    assert where == ["design", "states", 0.5]
+    assert where == ["design", "states", 0.5, begun.point]
     assert constraints[-1] == sf.AtLeast(3.0, ModalStiffness("wetter", 3.0))
 
 

@@ -79,6 +79,38 @@ def test_an_equilibrium_many_times_as_far_off_as_the_start_s_is_another_one(
         assert tried.factorisations == 3
 
 
+def test_terms_of_a_changed_problem_that_were_measured_in_the_same_states_are_not_again(
+    evaluator, monkeypatch
+):
+    measured = []
+
+    def measure(term, at):
+        measured.append(term.name)
+        return SimpleNamespace(value=np.array([0.5]))
+
+    kept, other, new = (SimpleNamespace(name=name, load="wet") for name in ("kept", "other", "new"))
+    monkeypatch.setattr(evaluation, "measured", measure)
+    monkeypatch.setattr(evaluation, "residuals", lambda part, value: value)
+    monkeypatch.setattr(evaluator, "assembly", lambda design: None)
+    monkeypatch.setattr(evaluator, "_at", lambda *_: None)
+    evaluator.blocks, evaluator.weights = SimpleNamespace(of=lambda _: np.zeros(2)), np.ones(1)
+
+    def posed(*limits):
+        parts = [SimpleNamespace(term=each) for each in limits]
+        evaluator.problem = SimpleNamespace(
+            minimise=[SimpleNamespace(term=kept)], constraints=parts, terms=[kept, *limits]
+        )
+
+    posed(other)
+    point = evaluator.seed("design", {}, 0.5)
+    posed(new)
+    again = evaluator.seed("design", {}, 0.5, before=point)
+    assert again.measurements[0] is point.measurements[0]
+    assert measured == ["kept", "other", "new"]
+    evaluator.seed("design", {}, 1.0, before=point)  # under another load
+    assert measured == ["kept", "other", "new", "kept", "new"]
+
+
 def test_a_start_that_does_not_bear_the_design_load_is_told_how_far_it_came(evaluator, monkeypatch):
     paths = {"wet": reached(0.1, on_branch=False, share=0.734), "wetter": reached(0.1), "wind": reached(0.1)}
     monkeypatch.setattr(evaluation, "follow", lambda shell, start, loads: paths)
