@@ -14,12 +14,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.reliability.branch import STRAY, Branch
-from shellform.reliability.drawing import (
-    Errors,
-    built_beams,
-    built_cables,
-    built_load,
-)
+from shellform.reliability.drawing import Errors, built_beams, built_cables, built_load
 from shellform.reliability.perfect import Perfect
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams
@@ -169,17 +164,11 @@ class Loading(Branch):
         return replace(found, resting=resting, factorisations=self.spent)
 
     def borne(
-        self,
-        most: float,
-        step: float,
-        smallest: float,
-        *,
-        begin: tuple[float, State] | None = None,
-        marks: Sequence[float] = (),
+        self, most: float, step: float, smallest: float, *, marks: Sequence[float] = ()
     ) -> tuple[Here | None, float]:
-        """As `followed`, but going on after local snaps, which are kept in `snaps`: where the structure
-        falls."""
-        here, factor = self.followed(most, step, smallest, begin=begin, marks=marks)
+        """As `followed` from nothing, but going on after local snaps, which are kept in `snaps`: where the
+        structure falls."""
+        here, factor = self.followed(most, step, smallest, marks=marks)
         while here is not None and factor < most and len(self.snaps) < SNAPS:
             goal = min(factor + _BEYOND * smallest, most)
             there = self._rested(here, goal)

@@ -11,10 +11,7 @@ from shellform.arrays import Flags, Reals, Record, flags
 from shellform.errors import InputError, require_known
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.reliability.branch import Branch
-from shellform.reliability.drawing import (
-    SHAPES,
-    Imperfections,
-)
+from shellform.reliability.drawing import SHAPES, Imperfections
 from shellform.reliability.members import Members, members_of, members_of_model
 from shellform.structure.answers.request import with_supports_moved
 from shellform.structure.answers.stability import modes
