@@ -30,7 +30,7 @@ from shellform.surface.imports import import_faces, sew
 from shellform.surface.occ import errors, extent, gmsh, mesh_faces, session, silence, surface_from
 from shellform.surface.readers.draft import Draft, require_mesh_size
 from shellform.surface.readers.nurbs import Patch
-from shellform.surface.readers.script import function_of, load_script, named_dimensions
+from shellform.surface.readers.script import builder, load_script, named_dimensions
 from shellform.surface.readers.stated import line_without_number
 from shellform.surface.shape.triangles import open_edges
 from shellform.surface.units import level_axes, turned_up, unit_factor
@@ -61,7 +61,7 @@ def build_surface(script: str | Path, *, size: float, **dimensions: float) -> Su
 def read_script(path: Path, *, size: float | None, dimensions: Mapping[str, float]) -> Draft:
     """What `build_surface` makes a surface of; `size` left out: a part of the largest dimension."""
     module = load_script(path)
-    build = function_of(module, "build", path)
+    build = builder(module, path)
     named = named_dimensions(build, dict(dimensions), path)
     mesh = max(named.values(), default=0.0) / _BUILT_EDGES if size is None else size
     form = getattr(module, "form", None)
@@ -77,7 +77,7 @@ def read_script(path: Path, *, size: float | None, dimensions: Mapping[str, floa
 def dimensions_of(script: str | Path) -> dict[str, float]:
     """The named dimensions, m, of a builder script and their defaults."""
     path = Path(script)
-    return named_dimensions(function_of(load_script(path), "build", path), {}, path)
+    return named_dimensions(builder(load_script(path), path), {}, path)
 
 
 def import_surface(
@@ -188,9 +188,8 @@ def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[
         nodes, coordinates, _ = gmsh.model.mesh.getNodes()
         kinds, _, corners = gmsh.model.mesh.getElements(2)
     places = coordinates.reshape(-1, 3)[:, :2]
-    own = [
-        int(np.flatnonzero(nodes == tag)[0]) for tag in tags
-    ]  # a mesh's vertex on a point has the point's number
+    # A mesh's vertex on a point has the point's number.
+    own = [int(np.flatnonzero(nodes == tag)[0]) for tag in tags]
     if not len(kinds) or not np.array_equal(places[own], np.vstack(outlines)):
         raise InputError("its outline can't be meshed", remedy="Check that it doesn't cross itself.")
     inside = np.setdiff1d(np.arange(len(nodes)), own)
@@ -264,7 +263,7 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
             where=str(source),
             remedy="Build its mesh instead (cad.build_surface).",
         )
-    build = function_of(module, "build", source)
+    build = builder(module, source)
     named = named_dimensions(build, dimensions, source)
     with session(), errors(source, "the script fails", "Check the script and its dimensions."):
         build(gmsh, **named)
