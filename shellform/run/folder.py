@@ -38,16 +38,8 @@ WRITTEN = (
     "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt", "profile.json", LOCK,
 )  # fmt: skip
 
-
-_PARTS = (
-    "",
-    "designs",
-    "states",
-    "figures",
-    "drawings",
-    "schedules",
-    "models",
-)  # folders that files stand in
+# folders that files stand in
+_PARTS = ("", "designs", "states", "figures", "drawings", "schedules", "models")
 
 
 class NoRunFolder(InputError):

@@ -138,9 +138,8 @@ def _write_mp4(path: Path, frames: Sequence[NDArray[np.uint8]], rate: int) -> No
     for frame in frames:
         writer.send(np.ascontiguousarray(frame[:height, :width]))
     writer.close()
-    if (
-        not path.is_file() or not path.stat().st_size
-    ):  # ffmpeg tells of a full disc on its own standard error only
+    # ffmpeg tells of a full disc on its own standard error only.
+    if not path.is_file() or not path.stat().st_size:
         raise OSError(0, "ffmpeg left no file")
 
 

@@ -26,14 +26,10 @@ from shellform.surface.readers.draft import Choice, Draft
 
 _LONGEST = 600.0  # seconds for one file
 _MEMORY = 0.8  # of the machine's, for the reader
-_OUT_OF_TIME = (
-    -signal.SIGXCPU if hasattr(signal, "SIGXCPU") else None
-)  # how the system ends what took too long
-_ONE_THREAD = {
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-}  # whose stacks are memory
+# how the system ends what took too long
+_OUT_OF_TIME = -signal.SIGXCPU if hasattr(signal, "SIGXCPU") else None
+# threads' stacks are memory
+_ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 _ANEW = "Open it in the program that wrote it, check it, and export it anew or in another format."
 _LIBRARIES = {
     "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "plyfile", "msh": "meshio",
