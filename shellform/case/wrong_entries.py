@@ -90,8 +90,8 @@ class _Place:
     table: Any
     meaning: str
     kinds: Sequence[str]
-    sign: str = ""
-    elsewhere: frozenset[str] = frozenset()
+    sign: str
+    elsewhere: frozenset[str]
 
 
 def _place(parts: Sequence[int | str], root: type[BaseModel]) -> _Place:

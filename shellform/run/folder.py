@@ -89,7 +89,7 @@ class Run(Record):
         return replace(self.shell, rod=Rod(named(catalogue, section)))
 
 
-def figures_folder(run: Run, folder: Path | None = None) -> Path:
+def figures_folder(run: Run, folder: Path | None) -> Path:
     """Where a run's pictures go: another `folder`, or figures/ of the run; made where it isn't there."""
     return make_folder(folder or run.folder / "figures")
 

@@ -22,7 +22,7 @@ _PACKED = np.array([65536, 256, 1])  # a colour as one number
 _HOLD = 1.5  # s that the last frame stays
 
 
-def write_png(path: str | Path, picture: NDArray[np.uint8], *, dots: float = 160.0) -> None:
+def write_png(path: str | Path, picture: NDArray[np.uint8], *, dots: float) -> None:
     """Writes a picture (height, width, 3 or 4), `dots` pixels an inch. Raises InputError for another ending
     and where the file can't be written.
     """

@@ -70,13 +70,13 @@ class Analysis(Record):
     converged: bool
     increments: tuple[LoadIncrement | PathIncrement, ...]
     seconds: Mapping[str, float]
-    message: str = ""
-    warnings: tuple[str, ...] = ()
-    modes: Modes | None = None
-    critical: Critical | None = None
-    critical_sought: float = 0.0
-    on_branch: bool | None = None
-    critical_mesh: Refined | None = None
+    message: str
+    warnings: tuple[str, ...]
+    modes: Modes | None
+    critical: Critical | None
+    critical_sought: float
+    on_branch: bool | None
+    critical_mesh: Refined | None
 
 
 def analyse(

@@ -174,10 +174,10 @@ def follow_branch(
     end: float,
     step: float = STEP,
     smallest: float = SMALLEST,
-    tolerance: float = TOLERANCE,
-    heeding: bool = False,
-    limit: int = 1000,
-    report: Reached | None = None,
+    tolerance: float,
+    heeding: bool,
+    limit: int,
+    report: Reached | None,
 ) -> BranchPart:
     """How far increments lead along the stable branch; see `advance`."""
     share, spent, good = 0.0, 0, 0

@@ -60,7 +60,7 @@ def prestressed(
     state: State,
     load: Reals,
     *,
-    tolerance: float = TOLERANCE,
+    tolerance: float,
     limit: int = 1000,
     progress: Relaxing | None = None,
 ) -> tuple[Equilibrium | None, int]:
