@@ -46,6 +46,7 @@ from shellform.structure.solve.residual import (
 
 # unbalanced over largest force; rounding leaves about 1e-10 for rods of EA/l = 1e7 N/m and 10 N loads
 TOLERANCE = 1e-8
+LIMIT = 1000  # factorisations of one relaxation
 TURN = 0.5  # rad, the largest rotation increment of a node in one step, in which the updates are first order
 _GROWTH, _DECAY = 10.0, 0.2  # of the mass after a failed and a good step
 _SUFFICIENT = 1e-4  # share of the predicted decrease of the potential that a step must bring (Armijo)
@@ -92,7 +93,7 @@ def find_equilibrium(
     load: Reals,
     *,
     tolerance: float = TOLERANCE,
-    limit: int = 1000,
+    limit: int = LIMIT,
     reach: float = np.inf,
     on_branch: bool = False,
     progress: Relaxing | None = None,
