@@ -57,8 +57,7 @@ def analyse(
     if output is not None and output.is_dir():
         raise InputError("is a folder, no file", where=str(output), remedy="Name a file in it.")
     refuse_overwriting([] if output is None else [output], (model, sections))
-    report = Spinner()
-    try:
+    with Spinner() as report:
         known = read_sections(sections) if sections is not None else None
         with limited_to_free_memory():
             analysis = solve(
@@ -77,8 +76,6 @@ def analyse(
                 ),
             )
         document = result(analysis, sections=known)
-    finally:
-        report.close()
     for warning in analysis.warnings:
         print(f"shellform: note: {warning}", file=sys.stderr)
     text = json.dumps(document, allow_nan=False)
