@@ -2,6 +2,7 @@
 without VTK.
 """
 
+import os
 import subprocess
 import sys
 import tomllib
@@ -22,7 +23,6 @@ import importlib.util
 spec = importlib.util.find_spec
 importlib.util.find_spec = lambda name, package=None: None if name in {missing} else spec(name, package)
 """
-STUDY = 'case = "case.toml"\nmethod = "grid"\n[vary]\nnet.spacing = [1.0]\n[column]\nmisfit = "net.spacing"\n'
 ASKED = {
     "study": ("pyarrow", "from shellform.study import store; store.arrow()"),
     "study ": ("distributed", "from shellform.study.engine import engine; engine(workers=1).__enter__()"),
@@ -42,7 +42,7 @@ def run(code, *missing, folder=ROOT):
         capture_output=True,
         text=True,
         check=False,
-        env={**__import__("os").environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from shellform.case.safety_entries import SafetyEntry
 
-_TOLERANCES = {
+_TOLERANCES = {  # by their names in [robust], where 0 left a cause out
     "cable_stiffness": "cable_stiffness",
     "cable_stiffness_all": "cable_stiffness_all",
     "rest_length": "cable_length",
@@ -19,7 +19,7 @@ _TOLERANCES = {
     "joints_all": "connectors_all",
     "loads": "load_each",
     "loads_all": "load_all",
-}  # by their names in [robust], where 0 left a cause out
+}
 _CRITICAL = SafetyEntry.model_fields["critical_factor"].default
 
 

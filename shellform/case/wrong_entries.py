@@ -90,8 +90,8 @@ class _Place:
     table: Any
     meaning: str
     kinds: Sequence[str]
-    sign: str = ""
-    elsewhere: frozenset[str] = frozenset()
+    sign: str
+    elsewhere: frozenset[str]
 
 
 def _place(parts: Sequence[int | str], root: type[BaseModel]) -> _Place:
@@ -103,9 +103,8 @@ def _place(parts: Sequence[int | str], root: type[BaseModel]) -> _Place:
     elsewhere: frozenset[str] = frozenset()
     for part in parts:
         plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
-        if (
-            get_origin(plain) is UnionType and len(get_args(plain)) == 2 and NoneType in get_args(plain)
-        ):  # a table that may be left out
+        # A table that may be left out.
+        if get_origin(plain) is UnionType and len(get_args(plain)) == 2 and NoneType in get_args(plain):
             plain = next(each for each in get_args(plain) if each is not NoneType)
         choices = {tag: each for each in get_args(plain) for tag in _tags(each)}
         if part in choices:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -57,8 +57,7 @@ def analyse(
     if output is not None and output.is_dir():
         raise InputError("is a folder, no file", where=str(output), remedy="Name a file in it.")
     refuse_overwriting([] if output is None else [output], (model, sections))
-    report = Spinner()
-    try:
+    with Spinner() as report:
         known = read_sections(sections) if sections is not None else None
         with limited_to_free_memory():
             analysis = solve(
@@ -77,11 +76,9 @@ def analyse(
                 ),
             )
         document = result(analysis, sections=known)
-    finally:
-        report.close()
     for warning in analysis.warnings:
         print(f"shellform: note: {warning}", file=sys.stderr)
-    text = json.dumps(document, default=_no_number, allow_nan=False)
+    text = json.dumps(document, allow_nan=False)
     if output is None:
         print(text)
     else:
@@ -103,7 +100,3 @@ def _lead(text: str) -> tuple[int, int, float]:
         raise InputError(
             "must read NODE:AXIS:METRES", where="--lead", value=text, remedy="For example 17:z:-0.05."
         ) from error
-
-
-def _no_number(value: object) -> Any:
-    raise TypeError(f"can't be written as JSON: {type(value).__name__}")

@@ -25,7 +25,7 @@ def calibrate(
     design: Annotated[
         str | None,
         typer.Option(
-            help="Of the run, as which the grid was built; left out: the run's last, without its cables."
+            help="Of the run, as which the grid was built; left out: the one to build, without its cables."
         ),
     ] = None,
     markers: Annotated[

@@ -51,21 +51,17 @@ def design(
     from shellform.structure.ahead import compiling_ahead
 
     def once(ending: Callable[[Report], Report] = lambda report: report) -> Summary:
-        spinner = Spinner(quiet=quiet)
-        try:
-            with compiling_ahead():
-                summary = run_case(
-                    load_case(case, settings or ()),
-                    output,
-                    until=until,
-                    fresh=fresh,
-                    allow_scripts=allow_scripts,
-                    profile=profile,
-                    sketch=sketch,
-                    report=ending(spinner),
-                )
-        finally:
-            spinner.close()
+        with Spinner(quiet=quiet) as spinner, compiling_ahead():
+            summary = run_case(
+                load_case(case, settings or ()),
+                output,
+                until=until,
+                fresh=fresh,
+                allow_scripts=allow_scripts,
+                profile=profile,
+                sketch=sketch,
+                report=ending(spinner),
+            )
         if as_json:
             _tell_json(summary)
         elif not quiet:

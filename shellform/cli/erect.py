@@ -12,7 +12,7 @@ from shellform.cli.terminal import tell_lines
 
 def erect(
     run: Annotated[Path, typer.Argument(help="Run folder.")],
-    design: Annotated[str | None, typer.Option(help="Left out: the run's last.")] = None,
+    design: Annotated[str | None, typer.Option(help="Left out: the one to build.")] = None,
     by: Annotated[
         str | None,
         typer.Option(

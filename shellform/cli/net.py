@@ -36,18 +36,17 @@ def net(
     from shellform.records.summary import document
     from shellform.run.first_look import labelled_net, net_alone
 
-    report = Spinner(quiet=quiet)
-    summary = net_alone(
-        surface,
-        output,
-        surface_options,
-        spacing=spacing,
-        angle=angle,
-        gap=gap,
-        allow_scripts=allow_scripts,
-        report=report,
-    )
-    report.close()
+    with Spinner(quiet=quiet) as report:
+        summary = net_alone(
+            surface,
+            output,
+            surface_options,
+            spacing=spacing,
+            angle=angle,
+            gap=gap,
+            allow_scripts=allow_scripts,
+            report=report,
+        )
     if as_json:
         print(json.dumps(document(summary), indent=1))
     elif not quiet:

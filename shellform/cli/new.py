@@ -52,19 +52,15 @@ def new(
     from shellform.run.sizes import DesignWish
     from shellform.structure.ahead import compiling_ahead
 
-    report = Spinner(quiet=quiet)
-    try:
-        with compiling_ahead():
-            told = propose_case(
-                surface,
-                output,
-                surface_options,
-                allow_scripts=allow_scripts,
-                wish=DesignWish(rod, spacing, thickness, angle, layers, edges),
-                way_out=way_out,
-                report=report,
-            )
-    finally:
-        report.close()
+    with Spinner(quiet=quiet) as report, compiling_ahead():
+        told = propose_case(
+            surface,
+            output,
+            surface_options,
+            allow_scripts=allow_scripts,
+            wish=DesignWish(rod, spacing, thickness, angle, layers, edges),
+            way_out=way_out,
+            report=report,
+        )
     if not quiet:
         tell_labelled(told)

@@ -81,8 +81,7 @@ def render(
     else:
         from shellform.run.films import draw_film
 
-        report = Spinner(quiet=quiet)
-        files = draw_film(found, film, asked, report=report)
-        report.close()
+        with Spinner(quiet=quiet) as report:
+            files = draw_film(found, film, asked, report=report)
     for file in () if quiet else files:
         print(file)

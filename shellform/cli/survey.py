@@ -22,7 +22,7 @@ def survey(
         ),
     ] = None,
     design: Annotated[
-        str | None, typer.Option(help="As which the grid was built; left out: the run's last.")
+        str | None, typer.Option(help="As which the grid was built; left out: the one to build.")
     ] = None,
     load: Annotated[str, typer.Option(help="Load case that the grid bears.")] = "none",
     unit: Annotated[str, typer.Option(help="Of the survey: m, cm, mm, in, ft.")] = "m",

@@ -18,8 +18,8 @@ _LASTING = (Kind.BEGAN, Kind.NOTE, Kind.KEPT, Kind.DONE)  # which stay as lines
 
 
 class Spinner:
-    """A spinner with the present step on a terminal; what is finished stays as a line, there and elsewhere.
-    Nothing if `quiet`.
+    """A spinner with the present step on a terminal, until its `with` ends; what is finished stays as a line,
+    there and elsewhere. Nothing if `quiet`.
     """
 
     def __init__(self, *, quiet: bool = False) -> None:
@@ -27,7 +27,10 @@ class Spinner:
 
         self.console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True, quiet=quiet)
         self.status = self.console.status("starting")
+
+    def __enter__(self) -> Spinner:
         self.status.start()
+        return self
 
     def __call__(self, event: Event) -> None:
         heed()
@@ -35,8 +38,7 @@ class Spinner:
             self.console.print(f"{event.stage}: {event.text}")
         self.status.update(f"{event.stage}: {event.text}")
 
-    def close(self) -> None:
-        """Ends the spinner."""
+    def __exit__(self, *_: object) -> None:
         self.status.stop()
 
 

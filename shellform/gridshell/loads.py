@@ -272,7 +272,7 @@ def staged(
 
 
 def crossings_to_load(
-    net: Net, every: int, openings: Sequence[ArrayLike] = (), within_one: Sequence[ArrayLike] = ()
+    net: Net, every: int, openings: Sequence[ArrayLike], within_one: Sequence[ArrayLike]
 ) -> Indices:
     """Numbers of the crossings whose lattice place i + j is a multiple of `every`, outside the plan polygons
     `openings` and, if any are given, inside one of `within_one`.

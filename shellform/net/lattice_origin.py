@@ -119,9 +119,8 @@ def _halves(along_u: Reals, along_v: Reals) -> tuple[Reals, list[Reals]]:
                 np.vstack([meet, along_v[j::-1]]),
             ]
             if all(np.linalg.norm(half[1] - meet) > 0.0 for half in halves):
-                if (
-                    matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0] > 0.0
-                ):  # v runs to the right of u: turn it round
+                # Where v runs to the right of u, it is turned round.
+                if matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0] > 0.0:
                     halves[2], halves[3] = halves[3], halves[2]
                 return meet, halves
     raise InputError(

@@ -11,6 +11,7 @@ from shellform.records.raising import SCAFFOLD, WayUpRecord, easiest
 from shellform.records.summary import BuiltShapeRecord, DesignRecord, LoadRecord, StandingRecord, Summary
 
 _SPENT = 1.25  # times the initial design's deviation as built, from which on it is worth a word
+_LISTED = 8  # names, where there are more of them
 LOADS = {"none": "no load", "design": "the design load", "additional": "the additional load"}
 TITLES = {
     "unbraced": "Unbraced",
@@ -125,11 +126,10 @@ def driven_words(own: BuiltShapeRecord) -> str:
     return f", driven by {cause_title(driver)}" if driver else ""
 
 
-def listed(names: Sequence[str], most: int = 8) -> str:
-    """Names, the first of them where there are many."""
-    return (
-        ", ".join(names) if len(names) <= most else f"{', '.join(names[:most])} and {len(names) - most} more"
-    )
+def listed(names: Sequence[str]) -> str:
+    """Names, the first of them where there are many, and how many others."""
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return f"{', '.join(names[:_LISTED])}{more}"
 
 
 def goes_slack_words(cables: Sequence[str]) -> str:

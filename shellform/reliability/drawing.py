@@ -40,7 +40,7 @@ from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State, moved
 
 PERFECT = -1  # the number of the structure without errors
-SHAPES = 3  # softest modes in which the shape is off
+SOFT_MODES = 3  # softest modes in which the shape is off
 _LEAST = 0.2  # of an element's length is left to it by errors of marks
 _LEAST_CABLE = 0.05  # of a cable's rest length
 
@@ -86,7 +86,7 @@ def sizes(members: Members) -> dict[str, int]:
         "load_each": members.zones,
         "load_all": 1,
         "load_uneven": 2,
-        "shape": SHAPES,
+        "shape": SOFT_MODES,
         "cable_stiffness_all": 1,
         "connectors_all": 1,
     }

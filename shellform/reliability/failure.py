@@ -73,9 +73,8 @@ def explained(workshop: Workshop, tolerances: Tolerances, *, seed: int, number: 
 
     def left(cause: str) -> Limit:
         other = {**z, cause: np.zeros_like(z[cause])}
-        return workshop.fall(
-            errors_of(nominal.members, tolerances, other), most=_MOST, resolution=_RESOLUTION
-        )
+        own = errors_of(nominal.members, tolerances, other)
+        return workshop.fall(own, most=_MOST, resolution=_RESOLUTION, tell=False)
 
     found = {cause: each.factor for cause, each in zip(active, side_by_side(left, active), strict=True)}
     assembly = assemble(nominal.network)

@@ -69,7 +69,7 @@ def expected_stiffness(assembly: Assembly, cables: Cables, state: State, deviati
 
 
 def stretch_deviation(
-    perfect: Perfect, tolerances: Tolerances, assembly: Assembly, *, seed: int = 0, drawn: int = DRAWN
+    perfect: Perfect, tolerances: Tolerances, assembly: Assembly, *, seed: int, drawn: int = DRAWN
 ) -> Reals:
     """Standard deviation (c,), m, of each cable's stretch l - l0 without load, to first order in all errors
     but the shape's and the load's; where no first order is to be had, that of the cables' own length."""

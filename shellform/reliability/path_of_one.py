@@ -14,12 +14,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.reliability.branch import STRAY, Branch
-from shellform.reliability.drawing import (
-    Errors,
-    built_beams,
-    built_cables,
-    built_load,
-)
+from shellform.reliability.drawing import Errors, built_beams, built_cables, built_load
 from shellform.reliability.perfect import Perfect
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams

@@ -12,10 +12,7 @@ from shellform.arrays import Flags, Reals, Record, flags
 from shellform.errors import InputError, require_known
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.reliability.branch import Branch
-from shellform.reliability.drawing import (
-    SHAPES,
-    Imperfections,
-)
+from shellform.reliability.drawing import SOFT_MODES, Imperfections
 from shellform.reliability.members import Members, members_of, members_of_model
 from shellform.structure.answers.request import with_supports_moved
 from shellform.structure.answers.stability import modes
@@ -72,7 +69,7 @@ def perfect(
     design: Design,
     load: Reals,
     *,
-    shapes: int = SHAPES,
+    shapes: int = SOFT_MODES,
     step: float = NOMINAL_STEP,
     heeding: bool = True,
 ) -> Perfect:
@@ -99,7 +96,7 @@ def unfollowed(shell: Gridshell, design: Design, load: Reals, imperfections: Imp
     )
 
 
-def perfect_of(model: Model, load: str, *, shapes: int = SHAPES, step: float = NOMINAL_STEP) -> Perfect:
+def perfect_of(model: Model, load: str, *, shapes: int = SOFT_MODES, step: float = NOMINAL_STEP) -> Perfect:
     """The same of a model file and one of its load cases. Raises InputError for an unknown one."""
     require_known(load, model.loads, where="load", what="there is no such load case")
     network, members = model.network, members_of_model(model)

@@ -64,7 +64,8 @@ def rare_failure(
 
     def one(z: Reals) -> float:
         errors = errors_of(members, tolerances, _by_cause(members, names, z))
-        return workshop.fall(errors, most=most, step=_STEP, resolution=RESOLUTION).factor - 1.0
+        fell = workshop.fall(errors, most=most, step=_STEP, resolution=RESOLUTION, tell=False)
+        return fell.factor - 1.0
 
     values, asked = list(known), 0
 

@@ -9,7 +9,7 @@ estimate then tells the size of it and nothing more.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,12 +22,11 @@ from shellform.reliability.drawing import PERFECT, draw_errors
 from shellform.reliability.path_of_one import SOUGHT, Limit
 from shellform.reliability.perfect import perfect_of
 from shellform.reliability.standing import Workshop
-from shellform.structure.answers.halved import Refined, with_middles
+from shellform.structure.answers.halved import Refined, cut_in_two, with_middles, with_nodes
 from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.sections import Section
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model
-from shellform.structure.network import Network
 
 _LOAD = "load"  # the name of the load case under which models are loaded here
 _STEP = 0.25  # of the load, towards the critical factor
@@ -84,35 +83,15 @@ def model_under(shell: Gridshell, design: Design, load: Reals) -> Model:
 def rods_halved(model: Model) -> Model:
     """The model with each beam of the kind "rod" cut in two, and what locks its layers with it, built into
     the start anew; its nodes come first, in their order."""
-    network = model.network
-    beams, count = network.beams, len(network.nodes)
+    network, beams = model.network, model.network.beams
     rods = np.flatnonzero(beams.of_kind(ROD))
-    a, b = beams.ends[rods].T
-    new = count + np.arange(len(rods))
-    nodes = np.vstack([network.nodes, 0.5 * (network.nodes[a] + network.nodes[b])])
-    ends, again = beams.ends.copy(), beams.ends[rods].copy()
-    ends[rods, 1], again[:, 0] = new, new
-    cut = beams.chosen(np.append(np.arange(len(beams.ends)), rods))
-    rest = cut.rest_length.copy()
-    rest[rods] *= 0.5
-    rest[len(beams.ends) :] *= 0.5
-    finer = replace(cut, ends=np.vstack([ends, again]), rest_length=rest)
-    wider = np.zeros((len(rods), 6))
+    middles = len(network.nodes) + np.arange(len(rods))
+    nodes = np.vstack([network.nodes, network.nodes[beams.ends[rods]].mean(axis=1)])
+    finer = cut_in_two(beams, rods, middles)
     start = None if model.start is None else with_middles(model.start, beams, rods)
     if start is not None and beams.of_kind(LOCK).any():
-        finer = _with_locks_cut(finer, start, beams, rods, new)
-    return Model(
-        Network(
-            nodes,
-            finer,
-            network.cables,
-            np.vstack([network.fixed, wider.astype(bool)]),
-            np.vstack([network.imposed, wider]),
-        ),
-        {name: np.vstack([load, wider]) for name, load in model.loads.items()},
-        start,
-        model.supported,
-    )
+        finer = _with_locks_cut(finer, start, beams, rods, middles)
+    return with_nodes(model, nodes, finer, start)
 
 
 def _with_locks_cut(finer: Beams, start: State, beams: Beams, rods: Indices, middle: Indices) -> Beams:

@@ -124,9 +124,9 @@ class Workshop:
         known to bear a factor of it in a state, and surely on which side of factors in `marks`; what ends its
         path is looked into only to `tell` it. `heeding`: what steps may pass over (outlook.py)."""
 
-        def ended(loading: Loading) -> Limit:
-            here, factor = loading.followed(most, step, resolution, begin=begin, marks=marks, heeding=heeding)
-            return self._ended(loading, here, factor, most, tell)
+        def ended(own: Loading) -> Limit:
+            end = own.followed(most, step, resolution, begin=begin, marks=marks, heeding=heeding)
+            return self._ended(own, end, most, tell)
 
         return self.with_structure(errors, ended)
 
@@ -138,16 +138,11 @@ class Workshop:
         step: float = STEP,
         resolution: float = 1 / 64,
         tell: bool = True,
-        begin: tuple[float, State] | None = None,
-        marks: Sequence[float] = (),
     ) -> Limit:
-        """As `limit`, but going on after local snaps: where the structure falls."""
-
-        def ended(loading: Loading) -> Limit:
-            here, factor = loading.borne(most, step, resolution, begin=begin, marks=marks)
-            return self._ended(loading, here, factor, most, tell)
-
-        return self.with_structure(errors, ended)
+        """As `limit`, from nothing, but going on after local snaps: where the structure falls."""
+        return self.with_structure(
+            errors, lambda own: self._ended(own, own.borne(most, step, resolution), most, tell)
+        )
 
     def rests(
         self, errors: Errors, *, resolution: float, marks: Sequence[float] = (), where: bool = True
@@ -156,21 +151,21 @@ class Workshop:
         (path_of_one.py) isn't loaded from nothing; unless it is asked `where` one falls, its factor is only
         on the right side of those in `marks` and of the whole load."""
 
-        def ended(loading: Loading) -> Limit:
-            here, factor = loading.beside(), 1.0
-            if here is None and where:
-                here, factor = loading.borne(1.0, STEP, resolution, marks=marks)
-            elif here is None:
-                here, factor = loading.told(marks, resolution)
-            return self._ended(loading, here, factor, 1.0, tell=False)
+        def ended(own: Loading) -> Limit:
+            beside = own.beside()
+            if beside is not None:
+                return self._ended(own, (beside, 1.0), 1.0, tell=False)
+            end = own.borne(1.0, STEP, resolution, marks=marks) if where else own.told(marks, resolution)
+            return self._ended(own, end, 1.0, tell=False)
 
         return self.with_structure(errors, ended)
 
-    def _ended(self, loading: Loading, here: Here | None, factor: float, most: float, tell: bool) -> Limit:
+    def _ended(self, own: Loading, end: tuple[Here | None, float], most: float, tell: bool) -> Limit:
+        here, factor = end
         if here is None:
-            return Limit(0.0, UNLOADED, self.nominal.unloaded, loading.spent)
-        kind = BORNE if factor >= most else (loading.kind(here) if tell else ENDED)
-        return Limit(factor, kind, here.state, loading.spent)
+            return Limit(0.0, UNLOADED, self.nominal.unloaded, own.spent)
+        kind = BORNE if factor >= most else (own.kind(here) if tell else ENDED)
+        return Limit(factor, kind, here.state, own.spent)
 
     def with_structure(self, errors: Errors, work: Callable[[Loading], Found], *, number: int = 0) -> Found:
         """What `work` finds of the structure with the errors, on an assembly that is its own meanwhile."""

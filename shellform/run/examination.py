@@ -51,7 +51,7 @@ from shellform.run.judged import asked_as_built, judged, run_checks
 from shellform.run.pace import time_words
 from shellform.run.raised import raised
 from shellform.run.rare_failures import rare_of
-from shellform.run.sampling import SHAPES, Clock, Examined, drawn_of
+from shellform.run.sampling import LOOKED_AT, Clock, Examined, drawn_of
 from shellform.run.thicker import rods_that_stand
 from shellform.run.workspace import Workspace
 from shellform.structure.elements.threads import side_by_side
@@ -216,7 +216,7 @@ def _stand(workspace: Workspace, each: Examined, count: int, summary: Summary, c
         guided = _guided(each, largest, shares, entry.seed) if first else {}
         for name, share in shares.items():
             own = replace(rows[name], stands=_standing(path, share, workspace.case))
-            if name == "design" and (before is None or before.drawn < SHAPES):
+            if name == "design" and (before is None or before.drawn < LOOKED_AT):
                 own = replace(own, built_shape=_built_shape(path, each, entry.seed))
             rows[name] = replace(own, expected_stiffness=guided.get(name, own.expected_stiffness))
     record = replace(summary.designs[each.name], loads=rows)

@@ -165,7 +165,7 @@ def _pixels(text: str) -> tuple[int, int]:
     return width, height
 
 
-def draw_everything(run: Run, *, mapped: bool | None = None, report: Report = unheard) -> bool:
+def draw_everything(run: Run, *, mapped: bool | None = None, report: Report) -> bool:
     """All pictures of a run. Without OpenGL the histories alone, a line that says why, and False. Where its
     maps are there already, `mapped` says whether all of them are."""
     drawn = draw_maps(run, report=report) if mapped is None else mapped

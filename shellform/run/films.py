@@ -129,9 +129,8 @@ def _erection(run: Run, name: str, wish: Wish, report: Report) -> list[Any]:
     braced = (k for k, step in enumerate(steps) if step.stage in ("tightening", "loading"))
     first = next(braced, len(steps))  # step with cables
     pairs = steps[first - 1].state.positions[shell.cable_ends]
-    slack = np.maximum(
-        np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1), design.rest_length
-    )  # as erection.py begins to tighten them
+    # As erection.py begins to tighten them.
+    slack = np.maximum(np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1), design.rest_length)
     none = design.unbraced()
     panels: list[Any] = []
     for number, step in enumerate(steps):

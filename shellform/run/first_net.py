@@ -176,7 +176,7 @@ def with_gap(
     edges: Edges,
     tell: Say,
     *,
-    climbs: bool = True,
+    climbs: bool,
 ) -> Placed:
     """The net pulled anew with another gap, its edges standing on what `edges` say; where that fails it
     `climbs` the ladder, or doesn't. Raises NoNet or Stalled."""

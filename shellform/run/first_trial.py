@@ -26,7 +26,7 @@ from shellform.problem.paths import deviations
 from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
 from shellform.run.first_edges import EdgeChoice
-from shellform.run.sampling import SHAPES
+from shellform.run.sampling import LOOKED_AT
 from shellform.run.sizes import LEAST_PRESTRAIN, STRAINED, Placed, RodChoice, Rope, thicker
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -214,7 +214,7 @@ def straying(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
     the design load, m."""
     shell, load = _shell(net, surface, parts, thickness)
     nominal = perfect(shell, shell.design(rest_ratio=parts.rest_ratio), load)
-    made = Workshop(nominal).load_numbers(default_tolerances(shell), seed=_SEED, numbers=range(SHAPES))
+    made = Workshop(nominal).load_numbers(default_tolerances(shell), seed=_SEED, numbers=range(LOOKED_AT))
     return max((each.far for each in made if each.stands), default=0.0)
 
 

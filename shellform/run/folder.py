@@ -38,17 +38,8 @@ WRITTEN = (
     "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt", "profile.json", "catalogues", LOCK,
 )  # fmt: skip
 
-
-_PARTS = (
-    "",
-    "designs",
-    "states",
-    "figures",
-    "drawings",
-    "schedules",
-    "models",
-    "catalogues",
-)  # folders that files stand in
+# folders that files stand in
+_PARTS = ("", "designs", "states", "figures", "drawings", "schedules", "models", "catalogues")
 
 
 class NoRunFolder(InputError):
@@ -98,7 +89,7 @@ class Run(Record):
         return replace(self.shell, rod=Rod(named(catalogue, section)))
 
 
-def figures_folder(run: Run, folder: Path | None = None) -> Path:
+def figures_folder(run: Run, folder: Path | None) -> Path:
     """Where a run's pictures go: another `folder`, or figures/ of the run; made where it isn't there."""
     return make_folder(folder or run.folder / "figures")
 

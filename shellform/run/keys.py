@@ -39,15 +39,13 @@ def stage_keys(case: Case, *, sketch: bool = False) -> dict[str, str]:
         if Path(entry.get("catalogue") or "").is_absolute():  # one of the case's own, wherever it lies
             entry["catalogue"] = Path(entry["catalogue"]).name
     stock = catalogue_bytes(case)
-    entries["stock"] = {
-        name: entries["rod"].pop(name) for name in ("stock_length", "kerf")
-    }  # which no design depends on
+    # No design depends on these.
+    entries["stock"] = {name: entries["rod"].pop(name) for name in ("stock_length", "kerf")}
     entries["cable"]["edge_cells"] = has_edge_cells(case)
     entries["stock"] |= {"adjustment": entries["cable"].pop("adjustment")}
     entries["edge_beam"] = entries["edges"].pop("beam")  # no net depends on its section
-    told = {
-        name: entries["safety"].pop(name) for name in ("drawn", "compared", "confidence", "rare")
-    }  # on which no search depends, but for how many it draws itself
+    # No search depends on these, but for how many it draws itself.
+    told = {name: entries["safety"].pop(name) for name in ("drawn", "compared", "confidence", "rare")}
     entries["told"] = told | {"built_deviation": entries["limits"].pop("built_deviation")}
     entries["safety"] |= {"searched": min(told["drawn"], SEARCHED)}
     digest = hashlib.sha256(shellform.__version__.encode() + _surface_content(file))

@@ -234,7 +234,7 @@ def erect(
     NotConverged.
     """
     run = read_run(folder)
-    name = design_named(run, design, run.best)
+    name = design_named(run, design)
     shell = run.shell_of(name)
     where = make_folder(output or run.folder / "schedules")
     files = [where / "erection.csv", where / "erection.npz"]
@@ -293,7 +293,7 @@ def _propped(props: str | None, shell: Gridshell) -> Indices | None:
 
 def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.Belief]:
     """The design's name, its shell, and what is believed of it: as drawn, or after the round before."""
-    name = design_named(run, options.design, run.best)
+    name = design_named(run, options.design)
     require_known(options.load, run.loads, where="--load", what="there is no such load case")
     shell, load = run.shell_of(name), run.loads[options.load]
     design, state = run.designs[name], run.states[name][options.load]

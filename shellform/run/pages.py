@@ -182,9 +182,8 @@ def _pictures(run: Run) -> list[Path]:
         for file in sorted((run.folder / "figures").glob("*"))
         if file.suffix.lower() in KINDS and file.is_file()
     ]
-    films = {
-        file.stem for file in found if file.suffix == ".mp4"
-    }  # which come as GIF as well, many times as large
+    # Films come as GIF as well, many times as large.
+    films = {file.stem for file in found if file.suffix == ".mp4"}
     wanted = [
         file
         for file in found

@@ -24,7 +24,7 @@ from shellform.case.beside_surface import doubts, refuse_beside
 from shellform.case.build_gridshell import gridshell, rod_limits
 from shellform.case.build_net import net_of, net_record, size_text, surface_of, surface_record, with_rods
 from shellform.case.case import Case, check_script
-from shellform.errors import InputError, NotConverged, ShellformError, require_file
+from shellform.errors import InputError, NotConverged, ShellformError, require_file, require_known
 from shellform.gridshell.gridshell import Gridshell, TooCurved
 from shellform.gridshell.joints import doubts as joint_doubts
 from shellform.gridshell.tolerances import default_tolerances
@@ -99,50 +99,27 @@ def run_case(
     then the first error is raised. With `profile`, profile.json tells what the stages took that were
     computed. A `sketch` is a first look (sketch.py).
     """
+    folder = Path(folder)
     with listening() if profile else nullcontext() as clock:
         profiler = None if clock is None else Profiler(clock)
-        return _run(
-            sketched(case) if sketch else case,
-            Path(folder),
-            until,
-            fresh,
-            allow_scripts,
-            wait,
-            profiler,
-            sketch,
-            report,
-        )
-
-
-def _run(
-    case: Case,
-    folder: Path,
-    until: str,
-    fresh: bool,
-    allow_scripts: bool,
-    wait: bool,
-    profiler: Profiler | None,
-    sketch: bool,
-    report: Report,
-) -> Summary:
-    """As `run_case`."""
-    if until not in STAGES:
-        raise InputError("is no stage", where="--until", value=until, remedy=f"Stages: {', '.join(STAGES)}.")
-    file = Path(case.surface.file)
-    require_file(file, where=f"surface.file: {file}")
-    check_script(file, allow_scripts=allow_scripts)
-    keys = stage_keys(case, sketch=sketch)
-    began = time.perf_counter()
-    parts = Parts()
-    if not _done(folder, fresh).has("surface", keys["surface"]):
-        # before anything is written: most bad input is a bad surface
-        report(Event("surface", f"reading {file}"))
-        parts = Parts(surface=surface_of(case.surface, allow_scripts=allow_scripts))
-        report(Event("surface", f"size {size_text(_there(parts.surface).size)}", Kind.NOTE))
-        refuse_beside(case, _there(parts.surface))
-    with alone(folder, wait=wait):
-        workspace = Workspace(case, folder, logged(folder, report), keys, until, profiler, sketch)
-        return _run_alone(workspace, fresh, parts, began)
+        case = sketched(case) if sketch else case
+        require_known(until, STAGES, where="--until", what="is no stage")
+        file = Path(case.surface.file)
+        require_file(file, where=f"surface.file: {file}")
+        check_script(file, allow_scripts=allow_scripts)
+        keys = stage_keys(case, sketch=sketch)
+        began = time.perf_counter()
+        parts = Parts()
+        if not _done(folder, fresh).has("surface", keys["surface"]):
+            # before anything is written: most bad input is a bad surface
+            report(Event("surface", f"reading {file}"))
+            surface = surface_of(case.surface, allow_scripts=allow_scripts)
+            report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
+            refuse_beside(case, surface)
+            parts = Parts(surface=surface)
+        with alone(folder, wait=wait):
+            workspace = Workspace(case, folder, logged(folder, report), keys, until, profiler, sketch)
+            return _run_alone(workspace, fresh, parts, began)
 
 
 def _done(folder: Path, fresh: bool) -> StagesDone:
@@ -277,31 +254,18 @@ def _net(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _E
     surface = _there(parts.surface)
 
     def pulled(target: Surface) -> tuple[Net, float, tuple[float, float]]:
-        return net_of(case, target, progress=lambda text: workspace.say("net", text))
+        return net_of(case, target, progress=partial(workspace.say, "net"))
 
     try:
         net, angle, offset = pulled(surface)
     except (NoNet, Stalled) as error:
         radius = COVERED * case.net.spacing
-        raise _with_way_out(workspace, "net", error, surface, radius, pulled) from error
+        folder, say = workspace.path(BUILDABLE), partial(workspace.say, "net")
+        raise with_way_out(error, surface, radius, folder, pulled, say) from error
     save_net(workspace.path("net.npz"), net)
     write_text(workspace.path("net.json"), json.dumps(net_document(net)))
     record = net_record(net, angle=angle, offset=offset, rods=rod_limits(case.rod, net))
     return _Ended(replace(parts, net=net), replace(summary, net=record))
-
-
-def _with_way_out(
-    workspace: Workspace,
-    stage: str,
-    error: InputError | NotConverged,
-    surface: Surface,
-    radius: float,
-    again: Callable[[Surface], object],
-) -> InputError | NotConverged:
-    def say(text: str) -> None:
-        workspace.say(stage, text)
-
-    return with_way_out(error, surface, radius, workspace.path(BUILDABLE), again, say)
 
 
 def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
@@ -313,7 +277,8 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
     try:
         shell, loads = gridshell(case, _there(parts.net), surface)
     except TooCurved as error:
-        raise _with_way_out(workspace, "initial", error, surface, error.radius, made) from error
+        folder, say = workspace.path(BUILDABLE), partial(workspace.say, "initial")
+        raise with_way_out(error, surface, error.radius, folder, made, say) from error
     parts = replace(parts, shell=shell, loads=loads)
     write_case(workspace.folder, case, default_tolerances(shell))
     net = with_rods(_there(summary.net), rod_limits(case.rod, shell.net))

@@ -22,7 +22,7 @@ from shellform.reliability.safety import paths
 from shellform.reliability.standing import Workshop
 
 _AT_ONCE = 10  # structures, before they are kept
-SHAPES = 20  # structures of which the shape is looked at: each takes some factorisations more
+LOOKED_AT = 20  # structures of which the shape is looked at: each takes some factorisations more
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ def drawn_of(
             seed=seed,
             numbers=range(first, min(first + _AT_ONCE, count)),
             marks=tuple(own.values()),
-            resting=own.get("design") if first < SHAPES else None,
+            resting=own.get("design") if first < LOOKED_AT else None,
         )
         path = DrawnPath(
             (*path.factors, *(each.factor for each in some)),
@@ -138,6 +138,6 @@ def drawn_of(
 def _shapes(shell: Gridshell, outcomes: Sequence[DrawnOutcome]) -> Iterator[DrawnShape]:
     """Of the first structures, those that rest under the design load."""
     for each in outcomes:
-        if each.resting is not None and each.number < SHAPES:
+        if each.resting is not None and each.number < LOOKED_AT:
             far = deviations(shell, each.resting)
             yield DrawnShape(each.number, float(far.max()), float(far.mean()))

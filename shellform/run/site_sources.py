@@ -38,7 +38,7 @@ def scanned(source: Path, design: str | None, output: Path | None, *, allow_scri
     Raises InputError for an unknown design, and as the readers of both."""
     if source.suffix.lower() != ".toml":
         run = read_run(source)
-        name = design_named(run, design, run.best)
+        name = design_named(run, design)
         return Scanned(
             run.shell_of(name),
             run.designs[name].unbraced() if design is None else run.designs[name],
@@ -88,9 +88,9 @@ def load_named(name: str, shell: Gridshell, loads: Mapping[str, Reals]) -> Reals
     )
 
 
-def design_named(run: Run, name: str | None, usual: str) -> str:
-    """The `name` of a design of the run, or where none is given the `usual` one. Raises InputError for an
+def design_named(run: Run, name: str | None) -> str:
+    """The `name` of a design of the run, or where none is given the best one's. Raises InputError for an
     unknown one."""
-    chosen = name or usual
+    chosen = name or run.best
     require_known(chosen, run.designs, where="--design", what="isn't there")
     return chosen

@@ -359,9 +359,7 @@ def _between_joints(surface: Surface, spacing: float, choice: RodChoice) -> floa
 
 def _without_creases(surface: Surface, spacing: float, choice: RodChoice) -> float:
     """About what load, N/m², the braced grid buckles under, curved as usual everywhere."""
-    rope = rope_for(spacing)
-    across, shear = choice.bending / spacing, rope.stiffness / (math.sqrt(2.0) * spacing)
-    return _BUCKLING * math.sqrt(across * shear) * 0.5 * curvature_usual(surface) ** 2
+    return _buckling(spacing, choice.bending, rope_for(spacing), 0.5 * curvature_usual(surface) ** 2)
 
 
 def bent_to(choice: RodChoice) -> float:
@@ -372,5 +370,10 @@ def bent_to(choice: RodChoice) -> float:
 
 def buckling_load(surface: Surface, spacing: float, bending: float, rope: Rope) -> float:
     """About what load, N/m², the braced grid of rods with EI `bending`, N·m², buckles under."""
+    return _buckling(spacing, bending, rope, curvature_mean_square(surface))
+
+
+def _buckling(spacing: float, bending: float, rope: Rope, squared: float) -> float:
+    """The same of a surface whose curvature has that mean square, 1/m²."""
     across, shear = bending / spacing, rope.stiffness / (math.sqrt(2.0) * spacing)
-    return _BUCKLING * math.sqrt(across * shear) * curvature_mean_square(surface)
+    return _BUCKLING * math.sqrt(across * shear) * squared

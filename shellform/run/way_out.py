@@ -44,7 +44,7 @@ def with_way_out(
     radius: float,
     folder: Path,
     again: Callable[[Surface], object],
-    say: Callable[[str], None] = lambda text: None,
+    say: Callable[[str], None],
 ) -> InputError | NotConverged:
     """The refusal of a surface with the nearest buildable one, as `nearest_buildable` finds it, for its
     remedy; as it was, where none is found."""
@@ -57,7 +57,7 @@ def nearest_buildable(
     radius: float,
     folder: Path,
     again: Callable[[Surface], object],
-    say: Callable[[str], None] = lambda text: None,
+    say: Callable[[str], None],
     shares: Iterable[float] = MORE,
     options: Callable[[], str] = lambda: "",
 ) -> Nearest | None:

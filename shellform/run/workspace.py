@@ -8,7 +8,6 @@ from pathlib import Path
 
 from shellform.case.case import Case
 from shellform.records.progress import Event, Kind, Report
-from shellform.records.stages import STAGES
 from shellform.run.profiling import Profiler
 
 
@@ -22,9 +21,9 @@ class Workspace:
     folder: Path
     report: Report
     keys: Mapping[str, str]
-    until: str = STAGES[-1]
-    profiler: Profiler | None = None
-    sketch: bool = False
+    until: str
+    profiler: Profiler | None
+    sketch: bool
 
     def path(self, name: str) -> Path:
         """Of a file in the folder."""

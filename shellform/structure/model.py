@@ -306,13 +306,18 @@ def _rest_lengths(entries: list[_Beam] | list[_Cable], part: str) -> Reals:
 def _axes(entries: list[_Beam], own: Flags) -> Reals:
     """The axes (k, 2, 3, 3) at both ends of the beams that give their own, as columns."""
     for beam in np.flatnonzero(own).tolist():
-        for name, there, remedy in (
-            ("z_axis", entries[beam].z_axis is not None, "Leave z_axis out: axes say where z is."),
-            ("rest_length", entries[beam].rest_length is None, "Give its length without stress, m."),
-        ):
-            if there:
-                what = "a beam with axes has no z_axis" if name == "z_axis" else "is needed beside axes"
-                raise InputError(what, where=f"beams[{beam}].{name}", remedy=remedy)
+        if entries[beam].z_axis is not None:
+            raise InputError(
+                "a beam with axes has no z_axis",
+                where=f"beams[{beam}].z_axis",
+                remedy="Leave z_axis out: axes say where z is.",
+            )
+        if entries[beam].rest_length is None:
+            raise InputError(
+                "is needed beside axes",
+                where=f"beams[{beam}].rest_length",
+                remedy="Give its length without stress, m.",
+            )
     axes = np.array([each.axes for each in entries if each.axes is not None], dtype=float)
     off = np.abs(axes @ axes.swapaxes(2, 3) - np.eye(3)).max(axis=(2, 3))
     wrong = ~((off < _SKEW) & (np.linalg.det(axes) > 0.0)).all(axis=1)

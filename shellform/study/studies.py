@@ -55,7 +55,7 @@ class StudyProgress:
     """How far a study is, as it goes on; `rows` are the latest with the columns asked for, `manned` tells of
     the workers."""
 
-    total: int = 0
+    total: int
     done: int = 0
     failed: int = 0
     found: int = 0

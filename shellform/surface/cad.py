@@ -17,7 +17,7 @@ its bisector.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,9 +28,9 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, NotConverged, require_file, require_number
 from shellform.surface.imports import import_faces, sew
 from shellform.surface.occ import errors, extent, gmsh, mesh_faces, session, silence, surface_from
-from shellform.surface.readers.draft import Draft, require_mesh_size
+from shellform.surface.readers.draft import Draft, Meshing, require_mesh_size
 from shellform.surface.readers.nurbs import Patch
-from shellform.surface.readers.script import function_of, load_script, named_dimensions
+from shellform.surface.readers.script import builder, load_script, named_dimensions
 from shellform.surface.readers.stated import line_without_number
 from shellform.surface.shape.triangles import open_edges
 from shellform.surface.units import level_axes, turned_up, unit_factor
@@ -61,14 +61,14 @@ def build_surface(script: str | Path, *, size: float, **dimensions: float) -> Su
 def read_script(path: Path, *, size: float | None, dimensions: Mapping[str, float]) -> Draft:
     """What `build_surface` makes a surface of; `size` left out: a part of the largest dimension."""
     module = load_script(path)
-    build = function_of(module, "build", path)
+    build = builder(module, path)
     named = named_dimensions(build, dict(dimensions), path)
     mesh = max(named.values(), default=0.0) / _BUILT_EDGES if size is None else size
     form = getattr(module, "form", None)
     with session(), errors(path, "the script fails", "Check the script and its dimensions."):
         build(gmsh, **named)
         gmsh.model.occ.synchronize()
-        points, triangles, normals = mesh_faces(mesh, path)
+        points, triangles, normals = mesh_faces(mesh, path, Meshing())
         if form is not None:
             points, normals = form(points, triangles, _on_edge(triangles, len(points)), **named), None
     return Draft(np.asarray(points, dtype=float), triangles, normals, 1.0)
@@ -77,7 +77,7 @@ def read_script(path: Path, *, size: float | None, dimensions: Mapping[str, floa
 def dimensions_of(script: str | Path) -> dict[str, float]:
     """The named dimensions, m, of a builder script and their defaults."""
     path = Path(script)
-    return named_dimensions(function_of(load_script(path), "build", path), {}, path)
+    return named_dimensions(builder(load_script(path), path), {}, path)
 
 
 def import_surface(
@@ -90,7 +90,7 @@ def import_surface(
     if kind is None:
         raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")
     turned_up(np.zeros((0, 3)), up)  # refuses an unknown axis before the work
-    draft = read_cad(file, kind, unit=unit, size=size, up=up)
+    draft = read_cad(file, kind, Meshing(size, up), unit=unit)
     normals = None if draft.normals is None else turned_up(draft.normals, up)
     return surface_from(turned_up(draft.points, up), draft.triangles, normals, str(file))
 
@@ -98,20 +98,15 @@ def import_surface(
 def read_cad(
     file: Path,
     kind: str,
+    meshing: Meshing,
     *,
     unit: str | None = None,
-    size: float | None = None,
-    up: str = "z",
-    face: str | None = None,
-    before_mesh: Callable[[float], None] = lambda triangles: None,
 ) -> Draft:
-    """The faces of a "step", "iges" or "brep" file, in m, meshed at about `size`, m (a sixtieth of its plan
-    if left out).
+    """The faces of a "step", "iges" or "brep" file, in m.
 
-    The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis,
-    and stays so; of a solid its "upper" or "lower" `face` is taken; `before_mesh` is told about how many
-    triangles there will be. Raises InputError for unreadable files, for solids without a `face`, and with one
-    for solids beside surfaces.
+    The unit is the file's own; a BREP file's is `unit` ("m" if left out). z isn't turned up yet. Raises
+    InputError for unreadable files, for solids of which no face is asked for, and where one is for solids
+    beside surfaces.
     """
     if kind != "brep" and unit is not None:
         raise InputError(
@@ -129,30 +124,22 @@ def read_cad(
         )
     factor = {"step": unit_factor("mm"), "iges": 1.0, "brep": unit_factor(unit or "m")}[kind]
     with session(), errors(file, "gmsh can't read it", "Open it in a CAD program and export it anew."):
-        left_out = import_faces(file, kind, face)
+        left_out = import_faces(file, kind, meshing.face)
         if factor != 1.0:
             gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, factor, factor, factor)
         gmsh.model.occ.synchronize()
-        draft = _draft(file, size, up, face, before_mesh)
+        draft = _draft(file, meshing)
     return replace(draft, notes=(*left_out, *draft.notes))
 
 
-def mesh_patches(
-    patches: Sequence[Patch],
-    *,
-    size: float | None,
-    up: str,
-    face: str | None,
-    where: Path,
-    before_mesh: Callable[[float], None] = lambda triangles: None,
-) -> Draft:
+def mesh_patches(patches: Sequence[Patch], where: Path, meshing: Meshing) -> Draft:
     """NURBS patches, m, trimmed and sewn where they touch, meshed as CAD files are."""
     with session(), errors(where, "gmsh can't build its surfaces", "Export it as STEP, or as a mesh."):
         for patch in patches:
             _add_patch(patch)
         gmsh.model.occ.synchronize()
         sew()
-        return _draft(where, size, up, face, before_mesh)
+        return _draft(where, meshing)
 
 
 def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[Reals, Indices]:
@@ -188,9 +175,8 @@ def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[
         nodes, coordinates, _ = gmsh.model.mesh.getNodes()
         kinds, _, corners = gmsh.model.mesh.getElements(2)
     places = coordinates.reshape(-1, 3)[:, :2]
-    own = [
-        int(np.flatnonzero(nodes == tag)[0]) for tag in tags
-    ]  # a mesh's vertex on a point has the point's number
+    # A mesh's vertex on a point has the point's number.
+    own = [int(np.flatnonzero(nodes == tag)[0]) for tag in tags]
     if not len(kinds) or not np.array_equal(places[own], np.vstack(outlines)):
         raise InputError("its outline can't be meshed", remedy="Check that it doesn't cross itself.")
     inside = np.setdiff1d(np.arange(len(nodes)), own)
@@ -233,19 +219,16 @@ def _knots(knots: Reals) -> tuple[Reals, Indices]:
     return values, times
 
 
-def _draft(
-    where: Path, size: float | None, up: str, face: str | None, before_mesh: Callable[[float], None]
-) -> Draft:
+def _draft(where: Path, meshing: Meshing) -> Draft:
     sides = extent()
     if not sides.max() > 0.0:
         raise InputError("has no extent", where=str(where), remedy="Export the surface anew.")
-    plan = sides[list(level_axes(up))]
-    mesh = float(plan.max()) / _DEFAULT_EDGES if size is None else size
-    points, triangles, normals = mesh_faces(mesh, where, face, up, before_mesh=before_mesh)
-    notes = (
-        () if face is None or not gmsh.model.getEntities(3) else (f"the {face} face of a solid was taken",)
-    )
-    return Draft(points, triangles, normals, 1.0, up, notes)
+    plan = sides[list(level_axes(meshing.up))]
+    size = float(plan.max()) / _DEFAULT_EDGES if meshing.size is None else meshing.size
+    points, triangles, normals = mesh_faces(size, where, meshing)
+    of_solid = meshing.face is not None and gmsh.model.getEntities(3)
+    notes = (f"the {meshing.face} face of a solid was taken",) if of_solid else ()
+    return Draft(points, triangles, normals, 1.0, meshing.up, notes)
 
 
 def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None:
@@ -264,7 +247,7 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
             where=str(source),
             remedy="Build its mesh instead (cad.build_surface).",
         )
-    build = function_of(module, "build", source)
+    build = builder(module, source)
     named = named_dimensions(build, dimensions, source)
     with session(), errors(source, "the script fails", "Check the script and its dimensions."):
         build(gmsh, **named)

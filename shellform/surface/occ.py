@@ -9,7 +9,7 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, ShellformError
-from shellform.surface.readers.draft import require_mesh_size
+from shellform.surface.readers.draft import Meshing, require_mesh_size
 from shellform.surface.shape.triangles import area_vectors, used_points
 from shellform.surface.units import turned_up
 
@@ -186,19 +186,9 @@ def to_sew(tolerance: float) -> bool:
     )
 
 
-def mesh_faces(
-    size: float,
-    where: Path,
-    side: str | None = None,
-    up: str = "z",
-    *,
-    before_mesh: Callable[[float], None] = lambda triangles: None,
-) -> tuple[Reals, Indices, Reals | None]:
+def mesh_faces(size: float, where: Path, meshing: Meshing) -> tuple[Reals, Indices, Reals | None]:
     """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's
-    faces, zero at poles, where they mean nothing.
-
-    Of a solid, only the triangles of its upper or lower `side`. `before_mesh` is told about how many
-    triangles the mesh will have.
+    faces, zero at poles, where they mean nothing, in a mesh of this `size`, m, and else as `meshing` says.
     """
     if not gmsh.model.getEntities(2):
         raise InputError(
@@ -209,7 +199,7 @@ def mesh_faces(
     spans = np.sort(extent())
     give = "the triangles' size in metres, such as 0.01, or leave it out"
     expected = require_mesh_size(size, spans[2], spans[1], where="surface.size", give=give)
-    before_mesh(expected)
+    meshing.begins(expected)
     gmsh.option.setNumber("Mesh.MeshSizeMin", size)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     gmsh.model.mesh.generate(2)
@@ -225,8 +215,8 @@ def mesh_faces(
             raise InputError(
                 f"gmsh made no triangles of its face {face}", where=str(where), remedy="Check the surface."
             )
-    if side is not None and gmsh.model.getEntities(3):
-        triangles = _on_side(points, triangles, side, up, where)
+    if meshing.face is not None and gmsh.model.getEntities(3):
+        triangles = _on_side(points, triangles, meshing.face, meshing.up, where)
     for face, mine in triangles.items():
         _add_normals(normals, points, mine, face, number)
     faces = np.vstack(list(triangles.values()))

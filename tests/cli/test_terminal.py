@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from shellform.cli import design as commands
-from shellform.cli.terminal import refusal_words, tell_as_built, tell_cases, tell_designs
+from shellform.cli.terminal import Spinner, refusal_words, tell_as_built, tell_cases, tell_designs
 from shellform.errors import InputError, NotConverged
 from shellform.records.failures import FailureRecord
 from shellform.records.optimisation import SectionRecord
@@ -210,3 +210,12 @@ def test_what_is_watched_is_the_case_with_its_settings(monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             commands.design(Path("a.toml"), Path("run"), watch=True, settings=settings)
     assert asked == [[], [], ["net.spacing=0.4"], ["net.spacing=0.4"]]
+
+
+def test_a_command_that_is_refused_gives_the_terminal_its_cursor_back(capsys, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    with pytest.raises(InputError), Spinner():
+        raise InputError("is too large")
+    shown = capsys.readouterr().err
+    assert shown.rindex("\x1b[?25h") > shown.rindex("\x1b[?25l")

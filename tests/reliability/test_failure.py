@@ -33,8 +33,8 @@ class Fallen:
             states=("unloaded", "half", "whole"),
         )
 
-    def fall(self, errors, *, most, resolution=1 / 64):
-        self.asked.append((most, resolution))
+    def fall(self, errors, *, most, resolution=1 / 64, tell=True):
+        self.asked.append((most, resolution, tell))
         without = [name for name, value in errors.items() if not any(value)]
         bears = {"supports": 0.7, "marks": 1.2, "load_all": 0.9}
         own = self.factor if resolution == 1 / 64 else self.finer or self.factor
@@ -69,7 +69,7 @@ def test_a_fall_is_explained_by_what_would_be_borne_without_each_cause_the_most_
     assert list(found.without.items()) == [("marks", 1.2), ("load_all", 0.9), ("supports", 0.7)]
     assert (found.driver, found.number, found.factor, found.kind) == ("marks", 8, 0.6, "limit point")
     fine = 1 / 1024
-    assert workshop.asked == [(1.0, fine), (1.5, fine), (1.5, fine), (1.5, fine)]
+    assert workshop.asked == [(1.0, fine, True), *3 * [(1.5, fine, False)]]
     assert (found.mode, found.state) == (("assembly", "end", 1), "end")
 
 

@@ -382,16 +382,28 @@ def workshop(monkeypatch):
     return made, limit
 
 
-@pytest.mark.parametrize(("way", "path"), [("limit", "followed"), ("fall", "borne")])
-def test_a_structure_s_limit_is_the_end_of_its_branch_and_its_fall_where_snaps_end(workshop, way, path):
+@pytest.mark.parametrize(
+    ("way", "path", "told", "usual"),
+    [
+        (
+            "limit",
+            "followed",
+            {"begin": "known", "marks": (0.9,)},
+            {"begin": None, "marks": (), "heeding": True},
+        ),
+        ("fall", "borne", {}, {}),
+    ],
+)
+def test_a_structure_s_limit_is_the_end_of_its_branch_and_its_fall_where_snaps_end(
+    workshop, way, path, told, usual
+):
     _, limit = workshop
     structure = Beside(END, 0.8)
-    how = {"step": 0.5, "resolution": 1 / 128, "begin": "known", "marks": (0.9,)}
-    assert vars(limit(way, structure, most=1.5, **how)) == vars(Limit(0.8, "kind of end", "end", 9))
-    heeding = {"heeding": True} if path == "followed" else {}
-    assert structure.asked == [(path, (1.5, 0.5, 1 / 128), {"begin": "known", "marks": (0.9,)} | heeding)]
+    found = limit(way, structure, most=1.5, step=0.5, resolution=1 / 128, **told)
+    assert vars(found) == vars(Limit(0.8, "kind of end", "end", 9))
+    assert structure.asked == [(path, (1.5, 0.5, 1 / 128), usual | told)]
     assert limit(way, structure, most=0.8).kind == BORNE
-    assert structure.asked[-1] == (path, (0.8, 1.0, 1 / 64), {"begin": None, "marks": ()} | heeding)
+    assert structure.asked[-1] == (path, (0.8, 1.0, 1 / 64), usual)
     assert limit(way, structure, most=0.9, tell=False).kind == ENDED
     assert vars(limit(way, Beside(None, 0.0), most=0.9)) == vars(Limit(0.0, UNLOADED, "unloaded", 9))
 

@@ -146,7 +146,7 @@ def test_a_net_that_is_refused_is_to_be_rounded_to_three_of_its_spacings(monkeyp
     monkeypatch.setattr(module, "net_of", stalls)
     monkeypatch.setattr(module, "with_way_out", way_out)
     workspace = SimpleNamespace(
-        case=SimpleNamespace(net=SimpleNamespace(spacing=0.4)), path=lambda name: tmp_path / name
+        case=SimpleNamespace(net=SimpleNamespace(spacing=0.4)), path=tmp_path.joinpath, say=print
     )
     with pytest.raises(InputError, match="with a way out"):
         module._net(workspace, module.Parts(surface="surface"), summary(["initial"]), keep=False)

@@ -199,10 +199,10 @@ def test_a_calibration_that_leaves_more_than_the_noise_is_doubtful(
 
 
 def test_a_design_and_a_load_are_those_named_or_the_usual_and_there(run):
-    assert design_named(run, None, "polished") == "polished"
-    assert design_named(run, "initial", "polished") == "initial"
+    assert design_named(run, None) == "polished"
+    assert design_named(run, "initial") == "initial"
     with pytest.raises(InputError, match=r"isn't there.*initial, polished"):
-        design_named(run, "rounded", "polished")
+        design_named(run, "rounded")
     assert load_named("wet", SHELL, run.loads) == "concrete"
     with pytest.raises(InputError, match=r"there is no such load case.*none, wet"):
         onsite._believed(run, Survey(load="snow"))

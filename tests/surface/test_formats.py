@@ -18,7 +18,7 @@ import trimesh
 from shellform.errors import InputError
 from shellform.surface import cad, occ
 from shellform.surface.readers import rhino
-from shellform.surface.readers.draft import Choice
+from shellform.surface.readers.draft import Choice, Meshing
 from shellform.surface.readers.gltf import surface_files
 from shellform.surface.readers.meshes import write_mesh
 from shellform.surface.readers.network_faces import faces_in_plan
@@ -638,7 +638,7 @@ def ellipse_on_the_cap(share):
 def test_curved_patches_are_cut_at_their_trims_and_holes():
     loops = [(rhino._curve(ellipse_on_the_cap(share), 1.0),) for share in (0.8, 0.3)]
     patch = rhino._patch(nurbs_cap(), loops, 1.0)
-    draft = cad.mesh_patches([patch], size=0.1, up="z", face=None, where=Path("trimmed.3dm"))
+    draft = cad.mesh_patches([patch], Path("trimmed.3dm"), Meshing(0.1))
     x, y, z = draft.points.T
     np.testing.assert_allclose(z, 1.5 * (1 - (x**2 / 9 + y**2 / 4) / 2), atol=1e-5)
     level = np.sqrt(x**2 / 9 + y**2 / 4)
@@ -655,7 +655,7 @@ def test_patches_are_sewn_over_gaps_of_up_to_a_millionth_of_their_extent(side, g
         return Patch(np.array(corner), np.ones((2, 2)), ([0.0, 0.0, 1.0, 1.0],) * 2, (1, 1))
 
     halves = [flat(0.0, 0.5 * side), flat(0.5 * side + gap, side)]
-    draft = cad.mesh_patches(halves, size=side, up="z", face=None, where=Path("halves.3dm"))
+    draft = cad.mesh_patches(halves, Path("halves.3dm"), Meshing(side))
     sides = np.sort(np.vstack([draft.triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
     found, count = np.unique(sides, axis=0, return_counts=True)
     middle = np.abs(draft.points[found[count == 1], 0] - 0.5 * side).max(axis=1) < 0.01 * side

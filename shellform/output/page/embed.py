@@ -30,7 +30,7 @@ class Picture:
     source: str
     width: int
     height: int
-    film: bool = False
+    film: bool
 
 
 def embed(files: Sequence[Path], *, budget: int) -> tuple[list[Picture], list[str]]:

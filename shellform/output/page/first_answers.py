@@ -208,9 +208,8 @@ def _is_safe(
         safe, words = as_built.holds, standing_count_words(more.stands)
         least = confidence_words(more.stands)
         sure = f"{least[:1].upper()}{least[1:]}. "
-        if (
-            safe and more.stands.standing < _SAFE * more.stands.drawn
-        ):  # no fewer than of an initial design that falls as often
+        # No fewer may stand than of an initial design that falls as often.
+        if safe and more.stands.standing < _SAFE * more.stands.drawn:
             safe, words = None, f"Not surely: {words}"
             sure += "No more are asked for. "
     rods = f", rods at {100.0 * used:.0f} % of their strength" if known else ""

@@ -22,7 +22,7 @@ _PACKED = np.array([65536, 256, 1])  # a colour as one number
 _HOLD = 1.5  # s that the last frame stays
 
 
-def write_png(path: str | Path, picture: NDArray[np.uint8], *, dots: float = 160.0) -> None:
+def write_png(path: str | Path, picture: NDArray[np.uint8], *, dots: float) -> None:
     """Writes a picture (height, width, 3 or 4), `dots` pixels an inch. Raises InputError for another ending
     and where the file can't be written.
     """
@@ -138,9 +138,8 @@ def _write_mp4(path: Path, frames: Sequence[NDArray[np.uint8]], rate: int) -> No
     for frame in frames:
         writer.send(np.ascontiguousarray(frame[:height, :width]))
     writer.close()
-    if (
-        not path.is_file() or not path.stat().st_size
-    ):  # ffmpeg tells of a full disc on its own standard error only
+    # ffmpeg tells of a full disc on its own standard error only.
+    if not path.is_file() or not path.stat().st_size:
         raise OSError(0, "ffmpeg left no file")
 
 

@@ -36,8 +36,7 @@ from shellform.written import path_to_write, whole
 _COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")  # Okabe and Ito's
 _DASHES = ("-", "--", ":")  # taken one by one when the colours are used up
 _FAR = -1.5  # values further below their limit than this run out of the picture: what is near is what counts
-_DOTS = 160.0  # pixels an inch
-HISTORY = Look(size=(1280, 704), dots=_DOTS, letters=10.0)
+HISTORY = Look(size=(1280, 704), dots=160.0, letters=10.0)
 _INCH, _POINTS = 25.4, 72.0  # mm and points in an inch
 _CAPITAL = 0.73  # height of a capital over the font's size
 _WIDE = 3.0  # value / limit - 1 above which the axis turns logarithmic beyond 1
@@ -309,7 +308,7 @@ def _lasting() -> Any:
     )
 
 
-def blank(size: tuple[int, int], *, transparent: bool = False, dots: float = _DOTS) -> Axes:
+def blank(size: tuple[int, int], *, transparent: bool, dots: float) -> Axes:
     """An empty page measured in pixels, `dots` an inch, from its lower left corner."""
     figure = Figure(
         figsize=(size[0] / dots, size[1] / dots), dpi=dots, facecolor="none" if transparent else "white"

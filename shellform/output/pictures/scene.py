@@ -52,12 +52,8 @@ Image = NDArray[np.uint8]
 
 # each pixel is the mean of 2 × 2; VTK's own multisampling took three times as long and looked no better
 _FINER = 2
-_MATT = {
-    "ambient": 0.5,
-    "diffuse": 0.5,
-    "smooth_shading": True,
-    "render": False,
-}  # colours stay those of the bar
+# colours stay those of the bar
+_MATT = {"ambient": 0.5, "diffuse": 0.5, "smooth_shading": True, "render": False}
 
 
 def paint(pages: Iterable[Canvas]) -> Iterator[Image]:
@@ -78,11 +74,8 @@ def paint(pages: Iterable[Canvas]) -> Iterator[Image]:
             for each in page.drawings:
                 if each.size not in windows:
                     windows[each.size] = _window(each.size)
-                known = (
-                    each.size,
-                    each.words,
-                    page.look.transparent,
-                )  # the words of a key tell its colours too
+                # The words of a key tell its colours too.
+                known = each.size, each.words, page.look.transparent
                 picture = kept.get(known)
                 if picture is None:
                     picture = _one(windows[each.size], each, page)
@@ -108,9 +101,8 @@ def _window(size: tuple[int, int]) -> pv.Plotter:
     with _quiet():
         plotter = pv.Plotter(off_screen=True, window_size=[_FINER * each for each in size], lighting="none")
         plotter.render_window.SetMultiSamples(0)
-        plotter.renderer.SetUseOIT(
-            False
-        )  # one surface of one colour needs no order, and a third of the time is saved
+        # One surface of one colour needs no order, and a third of the time is saved.
+        plotter.renderer.SetUseOIT(False)
         plotter.add_light(pv.Light(position=(-0.4, 0.6, 1.0), light_type="camera light"))
     return plotter
 
@@ -262,10 +254,8 @@ def _skin(surface: Skin) -> pv.PolyData:
 def _window_works() -> bool:
     """Whether VTK gets a drawing context: without one, drawing ends the process by a segmentation fault."""
     if sys.platform == "linux" and "VTK_DEFAULT_OPENGL_WINDOW" not in os.environ:
-        try:
-            ctypes.CDLL(
-                "libX11.so.6"
-            )  # VTK tries X first, and crashes where there is no X library to try it with
+        try:  # VTK tries X first, and crashes where there is no X library to try it with
+            ctypes.CDLL("libX11.so.6")
         except OSError:
             return False
     with _quiet():

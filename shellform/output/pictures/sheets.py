@@ -22,7 +22,7 @@ class Drawing:
 
     size: tuple[int, int]
     corner: tuple[int, int]
-    words: tuple[Word, ...] = ()
+    words: tuple[Word, ...]
     ramps: tuple[Ramp, ...] = ()
     panel: Panel | None = None
 

@@ -35,7 +35,14 @@ from shellform.structure.network import assemble, doubts, free_to_swing, held_sp
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.drive import Drive, turns_half
 from shellform.structure.solve.dynamic import dynamic
-from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium, newton, stability
+from shellform.structure.solve.equilibrium import (
+    LIMIT,
+    TOLERANCE,
+    Equilibrium,
+    find_equilibrium,
+    newton,
+    stability,
+)
 from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.loading import advance
 from shellform.structure.solve.path import follow
@@ -43,7 +50,6 @@ from shellform.structure.solve.residual import Drowned, Turning
 from shellform.structure.solve.settled import prestressed, settle
 from shellform.structure.solve.walk import Lead
 
-LIMIT = 1000  # factorisations of one relaxation
 _TIMED = ("assembly", "factorisation", "solve")
 _TURNING = 200  # the same under moments without potential, before their path is followed instead
 
@@ -70,13 +76,13 @@ class Analysis(Record):
     converged: bool
     increments: tuple[LoadIncrement | PathIncrement, ...]
     seconds: Mapping[str, float]
-    message: str = ""
-    warnings: tuple[str, ...] = ()
-    modes: Modes | None = None
-    critical: Critical | None = None
-    critical_sought: float = 0.0
-    on_branch: bool | None = None
-    critical_mesh: Refined | None = None
+    message: str
+    warnings: tuple[str, ...]
+    modes: Modes | None
+    critical: Critical | None
+    critical_sought: float
+    on_branch: bool | None
+    critical_mesh: Refined | None
 
 
 def analyse(
@@ -179,20 +185,16 @@ class _Analysis:
     followed_from: float | None = None  # the factor from which a path stands in for the relaxation
 
     def __post_init__(self) -> None:
-        network = self.model.network
+        network, start = self.model.network, self.model.start
         none = np.zeros_like(self.load)
         # Rotations that are imposed turn the node as a whole.
         check_imposed_turns(network)
-        imposed = none if self.model.start is not None else np.where(network.fixed, network.imposed, 0.0)
+        imposed = none if start is not None else np.where(network.fixed, network.imposed, 0.0)
         self.drive = Drive(self.load, imposed, none)
         self.loaded = np.flatnonzero(self.load.any(axis=1))
         self.swinging = swinging(network)
         self.turns = len(Turning(self.assembly, self.load).nodes) > 0
-        self.state = (
-            at_rest(network.nodes)
-            if self.model.start is None
-            else with_supports_moved(network, self.model.start)
-        )
+        self.state = at_rest(network.nodes) if start is None else with_supports_moved(network, start)
         self.origin = self.state
 
     def begin(self, method: str = "relaxation") -> None:

@@ -23,7 +23,7 @@ from shellform.errors import NotConverged
 from shellform.structure.answers.request import with_supports_moved
 from shellform.structure.answers.stability import critical_load
 from shellform.structure.elements import rotation
-from shellform.structure.elements.beam import STIFFNESSES, Beams
+from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.state import State, at_rest
 from shellform.structure.model import Model
 from shellform.structure.network import Network, assemble
@@ -105,36 +105,40 @@ def halved(model: Model) -> Model:
     network, beams = model.network, model.network.beams
     cut = np.flatnonzero(~beams.built_in)
     count, (a, b) = len(network.nodes), beams.ends[cut].T
-    new = count + np.arange(len(cut))
     offset = np.zeros((len(cut), 3)) if model.start is not None else _bulge(network.nodes, beams)[cut]
-    middle = 0.5 * (network.nodes[a] + network.nodes[b]) + offset
-    nodes = np.vstack([network.nodes, middle])
-    # The beams with their second ends at the middles, then their second halves.
-    whole = np.concatenate([np.arange(len(beams.ends)), cut])
-    ends, rest, frames = (each[whole] for each in (beams.ends, beams.rest_length, beams.frames))
-    ends[cut, 1], ends[len(beams.ends) :, 0] = new, new
-    halves = np.concatenate([cut, np.arange(len(beams.ends), len(whole))])
-    chord = nodes[ends[halves, 1]] - nodes[ends[halves, 0]]
+    nodes = np.vstack([network.nodes, 0.5 * (network.nodes[a] + network.nodes[b]) + offset])
+    finer = cut_in_two(beams, cut, count + np.arange(len(cut)))
+    halves = np.append(cut, np.arange(len(beams.ends), len(finer.ends)))
+    chord = nodes[finer.ends[halves, 1]] - nodes[finer.ends[halves, 0]]
     length = np.linalg.norm(chord, axis=1)
     before = np.linalg.norm(network.nodes[b] - network.nodes[a], axis=1)
-    rest[halves] *= length / np.tile(before, 2)
+    rest, frames = finer.rest_length.copy(), finer.frames.copy()
+    rest[halves] *= length / (0.5 * np.tile(before, 2))
     frames[halves] = _turned_to(frames[halves], chord / length[:, None])
-    others = {name: getattr(beams, name)[whole] for name in (*STIFFNESSES, "kind")}
-    none = np.zeros((len(cut), 6))
-    held = np.broadcast_to(network.fixed.all(axis=0) & ~network.imposed.any(axis=0), none.shape)
-    finer = replace(beams, ends=ends, rest_length=rest, frames=frames, **others)
-    return Model(
-        Network(
-            nodes,
-            finer,
-            network.cables,
-            np.vstack([network.fixed, held]),
-            np.vstack([network.imposed, none]),
-        ),
-        {name: np.vstack([load, none]) for name, load in model.loads.items()},
-        None if model.start is None else with_middles(model.start, beams, cut),
-        model.supported,
-    )
+    start = None if model.start is None else with_middles(model.start, beams, cut)
+    return with_nodes(model, nodes, replace(finer, rest_length=rest, frames=frames), start)
+
+
+def cut_in_two(beams: Beams, cut: Indices, middles: Indices) -> Beams:
+    """The beams with those numbered `cut` (k,) half as long, up to the nodes `middles` (k,), and behind all
+    of them their second halves."""
+    ends, again = beams.ends.copy(), beams.ends[cut]
+    ends[cut, 1] = again[:, 0] = middles
+    finer = beams.chosen(np.append(np.arange(len(ends)), cut))
+    rest = finer.rest_length.copy()
+    rest[cut] *= 0.5
+    rest[len(ends) :] *= 0.5
+    return replace(finer, ends=np.vstack([ends, again]), rest_length=rest)
+
+
+def with_nodes(model: Model, nodes: Reals, beams: Beams, start: State | None) -> Model:
+    """The model with all these `nodes` (n + k, 3), its own first, between other `beams` and from another
+    `start`; new ones bear no load and are held only as all others are."""
+    own, none = model.network, np.zeros((len(nodes) - len(model.network.nodes), 6))
+    held = np.broadcast_to(own.fixed.all(axis=0) & ~own.imposed.any(axis=0), none.shape)
+    network = Network(nodes, beams, own.cables, np.vstack([own.fixed, held]), np.vstack([own.imposed, none]))
+    loads = {name: np.vstack([load, none]) for name, load in model.loads.items()}
+    return Model(network, loads, start, model.supported)
 
 
 def with_middles(state: State, beams: Beams, cut: Indices) -> State:

@@ -291,38 +291,18 @@ def built_in(
         for value in (axial, torsion, bending_y, bending_z)
     )
     frames = turned.swapaxes(2, 3) @ straight.frames
-    return Beams(
-        ends=pairs,
-        axial=ea,
-        torsion=gj,
-        bending_y=eiy,
-        bending_z=eiz,
-        rest_length=straight.rest_length,
-        frames=frames,
-        kind=straight.kind,
-        kinds=(kind,),
-    )
+    return replace(straight, axial=ea, torsion=gj, bending_y=eiy, bending_z=eiz, frames=frames)
 
 
 def joined(first: Beams, second: Beams) -> Beams:
     """The beams of both, the `first` before the `second`, kinds of one name being one."""
     kinds = (*first.kinds, *(each for each in second.kinds if each not in first.kinds))
     number = np.array([kinds.index(each) for each in second.kinds], dtype=np.int64)
-    names = ("ends", *STIFFNESSES, "rest_length", "frames")
-    ends, ea, gj, eiy, eiz, rest, frames = (
-        np.concatenate([getattr(first, name), getattr(second, name)]) for name in names
-    )
-    return Beams(
-        ends=ends,
-        axial=ea,
-        torsion=gj,
-        bending_y=eiy,
-        bending_z=eiz,
-        rest_length=rest,
-        frames=frames,
-        kind=np.concatenate([first.kind, number[second.kind]]),
-        kinds=kinds,
-    )
+    both = {
+        name: np.concatenate([getattr(first, name), getattr(second, name)])
+        for name in ("ends", *STIFFNESSES, "rest_length", "frames")
+    }
+    return replace(first, **both, kind=np.concatenate([first.kind, number[second.kind]]), kinds=kinds)
 
 
 def _frames(x_axis: Reals, z_axis: Reals) -> Reals:

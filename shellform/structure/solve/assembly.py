@@ -41,7 +41,7 @@ class Balance(Record):
     force: Reals
     tangent: Reals | None
     largest: float
-    turned: float = 0.0
+    turned: float
 
 
 class Assembly:

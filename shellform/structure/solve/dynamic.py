@@ -25,7 +25,7 @@ from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
-from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium, stability
+from shellform.structure.solve.equilibrium import LIMIT, TOLERANCE, TURN, Equilibrium, stability
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.residual import (
     STAGNANT,
@@ -50,7 +50,7 @@ def dynamic(
     tolerance: float = TOLERANCE,
     time_step: float = FIRST,
     damping: float = DAMPING,
-    limit: int = 1000,
+    limit: int = LIMIT,
     progress: Callable[[int, float], None] | None = None,
 ) -> Equilibrium:
     """The equilibrium in which the fictitious motion from `start` under the dead `load` (n, 6) comes to rest.

@@ -46,14 +46,13 @@ from shellform.structure.solve.residual import (
 
 # unbalanced over largest force; rounding leaves about 1e-10 for rods of EA/l = 1e7 N/m and 10 N loads
 TOLERANCE = 1e-8
+LIMIT = 1000  # factorisations of one relaxation
 TURN = 0.5  # rad, the largest rotation increment of a node in one step, in which the updates are first order
 _GROWTH, _DECAY = 10.0, 0.2  # of the mass after a failed and a good step
 _SUFFICIENT = 1e-4  # share of the predicted decrease of the potential that a step must bring (Armijo)
-_CLOSE, _CONTRACTION = (
-    1e-2,
-    0.9,
-)  # a residual near the goal that falls this much counts, whatever the potential does:
-# sliding springs on a surface known to a finite order have no exact potential
+# A residual near the goal that falls this much counts, whatever the potential does: sliding springs on a
+# surface known to a finite order have no exact one.
+_CLOSE, _CONTRACTION = 1e-2, 0.9
 _SHORTEST = 0.1  # share of a step to which it is cut before the mass is raised instead
 _PATIENCE = 3  # steps with mass between two looks for a symmetric path
 _HEAVY = 1e6  # times the largest stiffness
@@ -94,7 +93,7 @@ def find_equilibrium(
     load: Reals,
     *,
     tolerance: float = TOLERANCE,
-    limit: int = 1000,
+    limit: int = LIMIT,
     reach: float = np.inf,
     on_branch: bool = False,
     progress: Relaxing | None = None,
@@ -320,9 +319,7 @@ class _Relaxation:
     def _advance(self, direction: Reals, downhill: float) -> bool:
         step = self.assembly.by_node(direction)
         turn, shift = float(np.abs(step[:, 3:]).max()), float(np.abs(step[:, :3]).max())
-        if not np.isfinite(
-            turn + shift
-        ):  # of a tangent whose last pivots are next to nothing: more mass is needed
+        if not np.isfinite(turn + shift):  # a tangent's last pivots are next to nothing: more mass is needed
             return False
         share = min(1.0, TURN / max(turn, TURN), self.reach / max(shift, 1e-300))
         if share < _SHORTEST:

@@ -31,7 +31,7 @@ from shellform.errors import NotConverged
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.drive import Drive, carried, forces, moved_on
-from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium
+from shellform.structure.solve.equilibrium import LIMIT, TOLERANCE, Equilibrium, find_equilibrium
 from shellform.structure.solve.leaps import Watch
 
 STEP = 0.25  # of the whole, the first increment
@@ -97,7 +97,7 @@ def advance(
     tolerance: float = TOLERANCE,
     stay: bool = False,
     heeding: bool = False,
-    limit: int = 1000,
+    limit: int = LIMIT,
     report: Reached | None = None,
 ) -> Loaded:
     """The equilibrium at the drive's factor `end`, reached from the equilibrium `start` at the factor
@@ -174,10 +174,10 @@ def follow_branch(
     end: float,
     step: float = STEP,
     smallest: float = SMALLEST,
-    tolerance: float = TOLERANCE,
-    heeding: bool = False,
-    limit: int = 1000,
-    report: Reached | None = None,
+    tolerance: float,
+    heeding: bool,
+    limit: int,
+    report: Reached | None,
 ) -> BranchPart:
     """How far increments lead along the stable branch; see `advance`."""
     share, spent, good = 0.0, 0, 0

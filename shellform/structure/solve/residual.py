@@ -14,9 +14,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.factorisation import Factor
 
-HOLDS = np.radians(
-    170.0
-)  # the largest local rotation that is accepted: at 180 degrees its measure turns back
+HOLDS = np.radians(170.0)  # largest local rotation that is accepted: at 180 degrees its measure turns back
 _UNTOLD = np.radians(90.0)  # of twist, up to which it is not told
 OF_LOAD = 1e-6  # of the load, the largest residual that is ever told to be none
 _BOUND = 16.0  # times what rounding leaves at most, its bound: of 1,060 random networks 16 to 400

@@ -18,7 +18,7 @@ from shellform.errors import NotConverged
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.drive import Drive
-from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, Relaxing, find_equilibrium
+from shellform.structure.solve.equilibrium import LIMIT, TOLERANCE, Equilibrium, Relaxing, find_equilibrium
 from shellform.structure.solve.leaps import at_rest
 from shellform.structure.solve.loading import SMALLEST, BranchPart, Loaded, Reached, follow_branch
 from shellform.structure.solve.path import FIRST, follow
@@ -34,7 +34,7 @@ def settle(
     end: float = 1.0,
     tolerance: float = TOLERANCE,
     stay: bool = False,
-    limit: int = 1000,
+    limit: int = LIMIT,
     report: Reached | None = None,
 ) -> Loaded:
     """As `advance`, heeding what increments may pass over; the stable branch ends where the path says so,
@@ -60,8 +60,8 @@ def prestressed(
     state: State,
     load: Reals,
     *,
-    tolerance: float = TOLERANCE,
-    limit: int = 1000,
+    tolerance: float,
+    limit: int = LIMIT,
     progress: Relaxing | None = None,
 ) -> tuple[Equilibrium | None, int]:
     """The equilibrium to which a state comes that isn't one under the `load` (n, 6), mostly none, and

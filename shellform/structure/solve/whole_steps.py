@@ -18,7 +18,7 @@ from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly, Balance
-from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium, find_equilibrium
+from shellform.structure.solve.equilibrium import LIMIT, TOLERANCE, TURN, Equilibrium, find_equilibrium
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
 from shellform.structure.solve.residual import STAGNANT, ResidualNorm, Turning, held, overturned
 
@@ -32,7 +32,7 @@ Foreseen = tuple[Reals, ...] | None  # deformations of each part of beams
 
 
 def next_equilibrium(
-    assembly: Assembly, start: State, load: Reals, *, tolerance: float = TOLERANCE, limit: int = 1000
+    assembly: Assembly, start: State, load: Reals, *, tolerance: float = TOLERANCE, limit: int = LIMIT
 ) -> Equilibrium:
     """The stable equilibrium next to the state `start` under the dead `load` (n, 6), N and N·m, by whole
     steps and, where these lose definiteness or don't come to rest, by relaxation on the branch.

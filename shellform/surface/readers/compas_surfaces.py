@@ -9,7 +9,7 @@ a difference, it is told.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, among, called, check_points, told_apart
+from shellform.surface.readers.draft import Choice, Draft, Meshing, among, called, check_points, told_apart
 from shellform.surface.readers.nurbs import Patch, with_end_knots
 from shellform.surface.units import unit_factor
 
@@ -55,15 +55,12 @@ def holds_surfaces(file: Path) -> bool:
 def read_compas_surfaces(
     file: Path,
     choice: Choice,
+    meshing: Meshing,
     *,
     unit: str | None,
-    size: float | None,
-    up: str,
-    face: str | None,
-    before_mesh: Callable[[float], None] = lambda triangles: None,
 ) -> Draft:
-    """The NURBS surfaces of a COMPAS file that `choice` means, in m, meshed at about `size`, m, as
-    `cad.read_cad` does; the `unit` is m where it is left out. Raises InputError for what can't be used.
+    """The NURBS surfaces of a COMPAS file that `choice` means, in m; the `unit` is m where it is left out.
+    Raises InputError for what can't be used.
     """
     from shellform.surface import cad
 
@@ -81,9 +78,7 @@ def read_compas_surfaces(
                 raise InputError(
                     f"its NURBS surface {name} is damaged: {error}", where=str(file), remedy="Save it anew."
                 ) from error
-    draft = cad.mesh_patches(
-        [patch for patch, _ in read], size=size, up=up, face=face, where=file, before_mesh=before_mesh
-    )
+    draft = cad.mesh_patches([patch for patch, _ in read], file, meshing)
     objects = tuple(called("", name) for name, meant in zip(names, kept, strict=True) if meant)
     notes = (*draft.notes, _ROWS) if any(either for _, either in read) else draft.notes
     return replace(draft, notes=notes, objects=objects)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,6 +66,18 @@ class Choice:
 
     layer: str = ""
     name: str = ""
+
+
+@dataclass(frozen=True)
+class Meshing:
+    """How a CAD file's surfaces are meshed: at about `size`, m (None: a sixtieth of the plan), of a solid its
+    "upper" or "lower" `face`, where `up` is the file's vertical axis; `begins` is told about how many
+    triangles there will be."""
+
+    size: float | None = None
+    up: str = "z"
+    face: str | None = None
+    begins: Callable[[float], None] = lambda triangles: None
 
 
 def among(labels: Sequence[tuple[str, str]], choice: Choice, where: str) -> Flags:

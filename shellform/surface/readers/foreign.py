@@ -22,18 +22,14 @@ import numpy as np
 from shellform.errors import InputError, NotConverged, ShellformError
 from shellform.processes import answering, command_of, end_with, surroundings
 from shellform.surface.readers.allowance import allow_file, allow_mesh
-from shellform.surface.readers.draft import Choice, Draft
+from shellform.surface.readers.draft import Choice, Draft, Meshing
 
 _LONGEST = 600.0  # seconds for one file
 _MEMORY = 0.8  # of the machine's, for the reader
-_OUT_OF_TIME = (
-    -signal.SIGXCPU if hasattr(signal, "SIGXCPU") else None
-)  # how the system ends what took too long
-_ONE_THREAD = {
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-}  # whose stacks are memory
+# how the system ends what took too long
+_OUT_OF_TIME = -signal.SIGXCPU if hasattr(signal, "SIGXCPU") else None
+# threads' stacks are memory
+_ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 _ANEW = "Open it in the program that wrote it, check it, and export it anew or in another format."
 _LIBRARIES = {
     "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "plyfile", "msh": "meshio",
@@ -151,22 +147,21 @@ def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
         from shellform.surface import cad
 
         return cad.read_script(file, size=settings["size"], dimensions=settings["dimensions"])
-    choice = Choice(settings["layer"], settings["name"])
-    meshed: dict[str, Any] = {name: settings[name] for name in ("unit", "size", "up", "face")}
-    meshed["before_mesh"] = allow_mesh
+    choice, unit = Choice(settings["layer"], settings["name"]), settings["unit"]
+    meshing = Meshing(settings["size"], settings["up"], settings["face"], allow_mesh)
     if kind == "compas surface":
         from shellform.surface.readers import compas_surfaces
 
-        return compas_surfaces.read_compas_surfaces(file, choice, **meshed)
+        return compas_surfaces.read_compas_surfaces(file, choice, meshing, unit=unit)
     if _LIBRARIES[kind] == "gmsh":
         from shellform.surface import cad
 
         _refuse_choice(file, choice)
-        return cad.read_cad(file, kind, **meshed)
+        return cad.read_cad(file, kind, meshing, unit=unit)
     if kind == "3dm":
         from shellform.surface.readers import rhino
 
-        return rhino.read_rhino(file, choice, **meshed)
+        return rhino.read_rhino(file, choice, meshing, unit=unit)
     if kind == "ply":
         from shellform.surface.readers import ply
 

@@ -265,9 +265,8 @@ def _parted(draft: Draft, size: float) -> Draft:
     of_fan[fan] = at
     corners = np.bincount(fan, minlength=fans)
     by_vertex = np.lexsort((-corners, of_fan))
-    extra = by_vertex[1:][
-        of_fan[by_vertex][1:] == of_fan[by_vertex][:-1]
-    ]  # all but the largest fan of a vertex
+    # All but the largest fan of a vertex.
+    extra = by_vertex[1:][of_fan[by_vertex][1:] == of_fan[by_vertex][:-1]]
     number = of_fan.copy()
     number[extra] = len(draft.points) + np.arange(len(extra))
     centre = draft.points[faces].mean(axis=1)

@@ -12,7 +12,7 @@ are homogeneous.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ import rhino3dm
 
 from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, MeshObject, among, called, joined
+from shellform.surface.readers.draft import Choice, Draft, Meshing, MeshObject, among, called, joined
 from shellform.surface.readers.nurbs import Curve, Patch, with_end_knots
 from shellform.surface.readers.rhino_bytes import without_date_and_path
 
@@ -109,17 +109,14 @@ def _through(points: Reals) -> Any:
 def read_rhino(
     file: Path,
     choice: Choice,
+    meshing: Meshing,
     *,
     unit: str | None,
-    size: float | None,
-    up: str,
-    face: str | None,
-    before_mesh: Callable[[float], None] = lambda triangles: None,
 ) -> Draft:
     """The surfaces and meshes of a 3DM file that `choice` means, in m.
 
-    Surfaces are meshed at about `size`, m, as `cad.read_cad` does. Raises InputError for what can't be read,
-    for a stated `unit` where the file has its own, and where no object is a surface.
+    Raises InputError for what can't be read, for a stated `unit` where the file has its own, and where no
+    object is a surface.
     """
     model = rhino3dm.File3dm.Read(str(file))
     if model is None:
@@ -153,10 +150,10 @@ def read_rhino(
             remedy="Choose by surface.object or surface.layer (--object, --layer).",
         )
     if parts:
-        return replace(joined(parts, Choice(), str(file)), metres=1.0, up=up)
+        return replace(joined(parts, Choice(), str(file)), metres=1.0, up=meshing.up)
     from shellform.surface import cad
 
-    draft = cad.mesh_patches(patches, size=size, up=up, face=face, where=file, before_mesh=before_mesh)
+    draft = cad.mesh_patches(patches, file, meshing)
     return replace(draft, objects=tuple(called(layer, name) for layer, name, _ in chosen))
 
 

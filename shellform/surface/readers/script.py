@@ -29,17 +29,17 @@ def load_script(path: Path) -> ModuleType:
         raise InputError(
             f"the script fails: {type(error).__name__}: {error}",
             where=str(path),
-            remedy="Mend the script: build(size, **dimensions) draws the surface with gmsh.",
+            remedy="Mend the script: build(gmsh, *, length=0.90, ...) draws the surface with gmsh.",
         ) from error
     return module
 
 
-def function_of(module: ModuleType, name: str, path: Path) -> Callable[..., Any]:
-    """The script's function of that name. Raises InputError where it has none."""
-    found = getattr(module, name, None)
+def builder(module: ModuleType, path: Path) -> Callable[..., Any]:
+    """The script's function `build`. Raises InputError where it has none."""
+    found = getattr(module, "build", None)
     if not callable(found):
         raise InputError(
-            f"has no function {name}(gmsh, *, ...)", where=str(path), remedy="See surfaces/dome.py."
+            "has no function build(gmsh, *, ...)", where=str(path), remedy="See surfaces/dome.py."
         )
     return found  # type: ignore[no-any-return]
 

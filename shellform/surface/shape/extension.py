@@ -23,16 +23,8 @@ from shellform.surface.shape.target import Surface, rough_normals
 from shellform.surface.shape.triangles import adjacency
 
 _OPEN = 0.05  # of a cell's width at the edge: the least that it may narrow to
-_STRETCHES = (
-    0.0,
-    1.0,
-    4.0,
-    16.0,
-    64.0,
-    256.0,
-    1024.0,
-    4096.0,
-)  # squares of the numbers of vertices to even out over
+# squares of the numbers of vertices to even out over
+_STRETCHES = (0.0, 1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0)
 _SHORTENED = 0.8  # of the length at which a line would cross its neighbour
 
 

@@ -37,9 +37,8 @@ def bent_heights(
     length = np.linalg.norm(along, axis=1)
     tangent = along / length[:, None]
     normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
-    sense = np.where(
-        directed[:, 0] == pairs[number, 0], 1.0, -1.0
-    )  # θ of an edge is along the normal of its sorted direction
+    # θ of an edge is along the normal of its sorted direction.
+    sense = np.where(directed[:, 0] == pairs[number, 0], 1.0, -1.0)
     first, second = (
         plan[triangles[:, 1]] - plan[triangles[:, 0]],
         plan[triangles[:, 2]] - plan[triangles[:, 0]],
