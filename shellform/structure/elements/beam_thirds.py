@@ -18,6 +18,10 @@ from shellform.structure.elements.beam_kernels import evaluate
 _STEP = 1e-30  # of the complex shift: its square vanishes beside 1
 _AT_ONCE = 32  # elements, whose arrays stay in the processor's cache
 
+# Its products and sums aren't contracted: the loop that calls it would have a copy contracted otherwise, and
+# which one is run would depend on what this process has compiled and what it has from the cache.
+_evaluate = njit(error_model="numpy")(evaluate.py_func)
+
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def contracted(start, stop, positions, quaternions, ends, frames, rest_length, stiffness, weights, result):  # type: ignore[no-untyped-def]
@@ -42,7 +46,7 @@ def contracted(start, stop, positions, quaternions, ends, frames, rest_length, s
             end, axis = divmod(dof, 6)
             for e in range(count):
                 _shift(place[2 * e + end], turn[2 * e + end], axis, 1j * _STEP)
-            evaluate(
+            _evaluate(
                 0, count, place, turn, pairs, frames[first:last], rest_length[first:last],
                 stiffness[first:last], given, 1.0, energy, force, blocks, none, none, angle,
             )  # fmt: skip
