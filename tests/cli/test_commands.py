@@ -130,7 +130,9 @@ def test_bad_surfaces_and_cases_are_refused_without_a_traceback(tmp_path):
         shellform("design", case, "--output", tmp_path / "run", *wide, "--set", "surface.size=10"), "unit"
     )
     refused(shellform("design", case, "--output", tmp_path / "run", "--set", "rod.radius=0.01"), "they break")
-    refused(shellform("design", case, "--output", tmp_path / "run", "--until", "lunch"), "Stages")
+    refused(
+        shellform("design", case, "--output", tmp_path / "run", "--until", "lunch"), "Known: surface, net"
+    )
     refused(shellform("render", tmp_path / "none"), "no run folder")
     refused(shellform("report", tmp_path / "none"), "no run folder")
     own = tmp_path / "own.py"

@@ -24,7 +24,7 @@ from shellform.output.workshop.directions import edge_away, rods_away
 from shellform.output.workshop.setting_out import elevations, support_plan
 from shellform.site.measurements import read_places
 from shellform.structure.elements.sections import Material, Rectangle
-from shellform.structure.elements.state import moved
+from shellform.structure.elements.state import at_rest, moved
 
 
 @pytest.fixture(scope="module")
@@ -515,7 +515,7 @@ def test_a_shoe_is_three_times_as_wide_as_the_rod_s_larger_side():
     assert asked == [0.04], "the design's, not the first one's"
 
 
-def test_supports_of_rods_and_of_edge_beams_lead_from_their_feet_to_the_next_node(monkeypatch):
+def test_supports_lead_along_the_tangents_of_rods_and_of_edge_beams_at_their_feet(monkeypatch):
     """A rod U0 of five nodes and an edge beam E0 of five others, of which three stand on the ground; the
     first of the beam's feet is the rod's second end too, and is called after the rod."""
     place = np.array(
@@ -526,13 +526,15 @@ def test_supports_of_rods_and_of_edge_beams_lead_from_their_feet_to_the_next_nod
     )  # fmt: skip
     rod = SimpleNamespace(direction="u", nodes=np.arange(5))
     net = SimpleNamespace(
-        grid=SimpleNamespace(rods=(rod,)),
+        grid=SimpleNamespace(rods=(rod,), flat=place),
         edges=(SimpleNamespace(nodes=np.array([4, 5, 6, 7, 8])),),
         supports=np.array([8, 0, 4]),
+        target=at_rest(place),
     )
     built = SimpleNamespace(
         grid=net.grid,
-        shell=SimpleNamespace(net=net, target=SimpleNamespace(positions=place)),
+        shell=SimpleNamespace(net=net, target=net.target),
+        states={"none": net.target},
         origin_notes=("from there",),
     )
     push = np.outer(np.arange(9.0), [1.0, -2.0, 3.0])
@@ -542,7 +544,10 @@ def test_supports_of_rods_and_of_edge_beams_lead_from_their_feet_to_the_next_nod
     table = schedules.supports(built)
     beam, first, second = table.rows
     assert beam[:6] == ("S0", "E0", "second", -1.0, -1.0, 1.0)
-    assert beam[6:9] == (pytest.approx(np.arctan2(3.0, 4.0)), pytest.approx(np.arctan2(1.0, 5.0)), "S1")
+    # the parabola's: its second chord is √3 times as long as the first one, (4, 3, 1)
+    k = 1.0 + np.sqrt(3.0)
+    x, y, z = k * np.array([4.0, 3.0, 1.0]) - np.array([6.0, 10.0, 6.0]) / k
+    assert beam[6:9] == (pytest.approx(np.arctan2(y, x)), pytest.approx(np.arctan2(z, np.hypot(x, y))), "S1")
     assert beam[9:] == (8.0, -16.0, 24.0, 80.0, -160.0, 240.0)
     assert first[:6] == ("S1", "U0", "first", 1.0, 2.0, 0.5)
     assert first[6:9] == (pytest.approx(np.pi / 2.0), pytest.approx(np.arctan2(4.0, 3.0)), "S0, S2")
@@ -553,19 +558,24 @@ def test_supports_of_rods_and_of_edge_beams_lead_from_their_feet_to_the_next_nod
     assert table.columns[9:] == tuple(
         f"{name}: on the support along {axis} [N]" for name in ("erected", "design") for axis in "xyz"
     )
-    assert "nearer than 30 mm" in table.notes[1]
-    assert table.notes[1].endswith("clash: S0 and S1, 12.5 mm, S1 and S2, 20.0 mm.")
-    assert table.notes[2:] == ("from there",)
+    assert table.notes[2] == "From these directions rods turn in their supports: erected up to 0.0° (S1)."
+    assert "nearer than 30 mm" in table.notes[3]
+    assert table.notes[3].endswith("clash: S0 and S1, 12.5 mm, S1 and S2, 20.0 mm.")
+    assert table.notes[4:] == ("from there",)
 
 
 def test_an_edge_beam_s_first_foot_leads_along_the_beam(monkeypatch):
     place = np.array([[1.0, 1.0, 0.0], [4.0, -3.0, 5.0], [0.0, 0.0, 0.0], [2.0, 2.0, 2.0]])
     net = SimpleNamespace(
-        grid=SimpleNamespace(rods=()), edges=(SimpleNamespace(nodes=np.arange(4)),), supports=np.array([0])
+        grid=SimpleNamespace(rods=(), flat=place),
+        edges=(SimpleNamespace(nodes=np.arange(4)),),
+        supports=np.array([0]),
+        target=at_rest(place),
     )
     built = SimpleNamespace(
         grid=net.grid,
-        shell=SimpleNamespace(net=net, target=SimpleNamespace(positions=place)),
+        shell=SimpleNamespace(net=net, target=net.target),
+        states={"none": net.target},
         origin_notes=(),
     )
     monkeypatch.setattr(schedules, "support_forces", lambda _: {"none": np.ones((4, 3))})
@@ -580,14 +590,14 @@ def test_an_edge_beam_s_first_foot_leads_along_the_beam(monkeypatch):
         1.0,
         1.0,
         0.0,
-        pytest.approx(np.arctan2(-4.0, 3.0)),
-        pytest.approx(np.pi / 4.0),
+        pytest.approx(np.arctan2(-7.5, 6.5)),  # 2 (3, -4, 5) - (-1, -1, 0) / 2, the two chords alike
+        pytest.approx(np.arctan2(10.0, np.hypot(6.5, 7.5))),
         "",
         1.0,
         1.0,
         1.0,
     )
-    assert table.notes[1].endswith("clash: none.")
+    assert table.notes[2].endswith("clash: none.")
 
 
 @pytest.mark.parametrize("density", [460.0, 0.0])

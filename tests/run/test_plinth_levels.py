@@ -12,7 +12,7 @@ from shellform.surface.shape import target
 
 @pytest.fixture
 def feet(monkeypatch):
-    def found(radius, rest, *, side=8.0, lowest=0.333, spacing=0.5, can_be_cut=True):
+    def found(radius, rest, *, side=8.0, lowest=0.333, spacing=0.5, can_be_cut=True, slopes=False):
         """The plinths of a surface that is bent to a radius, and cut off to the `rest`."""
         surface = SimpleNamespace(
             size=np.array([0.5 * side, side, 90.0]), vertices=np.array([[0.0, 5.0, lowest], [9.0, -7.0, 8.0]])
@@ -26,6 +26,7 @@ def feet(monkeypatch):
         monkeypatch.setattr(plinths, "sharpest_bend", lambda own: (0, radius if own is surface else rest))
         monkeypatch.setattr(plinths, "first_spacing", lambda own: (spacing, "so"))
         monkeypatch.setattr(plinths, "cut_off", cut_off)
+        monkeypatch.setattr(plinths, "ground_under", lambda own: SimpleNamespace(slopes=slopes))
         return plinths.plinths_for(surface)
 
     return found
@@ -49,6 +50,7 @@ def test_plinths_are_for_feet_bent_to_two_spacings_that_are_the_reason(feet):
     assert feet(1.01, 9.0) is None, "rods follow that"
     assert feet(1.0, 1.39) is None, "it is bent as sharply elsewhere"
     assert feet(1.0, 9.0, can_be_cut=False) is None
+    assert feet(1.0, 1.41, slopes=True) is None, "no level cuts off feet on a slope alike"
 
 
 def test_a_surface_is_bent_most_inside_its_edge(monkeypatch):
