@@ -8,8 +8,6 @@ has only the stiffness s0 > 0 left:
 
     f(x, d) = F p,   s(x, d) = s0.
 
-The stiffness is looked at on the way, and what comes after it has first fallen to s0 isn't followed.
-
 At a limit point the stiffness falls like the root of the distance, and its slope by the load is infinite. A
 little stiffness left keeps the equations regular, and F depends on the design as smoothly as the load at the
 limit point does. With the adjoint K y = ds/dx, along the path ds/dF = y'p, and by the design
@@ -24,7 +22,7 @@ stretch l - l0 comes to 0, and stands in the place of s in the same equations, K
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,38 +90,27 @@ def borne(
     rates: Sequence[Part] = (),
     exact: float = EXACT,
     near: tuple[float, State] | None = None,
-    report: Callable[[float, State], None] | None = None,
 ) -> BorneFactor:
     """The factor up to which the structure keeps the stiffness `left`, N/m, to a relative error `exact` of
     it, `most` where it does so beyond; `rates` are the beams as built with the derivatives of their stiffness
     by further variables. From nothing, or from a factor and a state `near` it, of the same structure in a
-    design nearby, if Newton's steps from there keep every tangent definite. `report` is told the factors and
-    states that it goes through. Raises NotConverged where there is no unloaded equilibrium."""
-    points: list[_Point] = []
-
-    def soft(factor: float, here: Here) -> bool:
-        points.append(_point(loading, here, factor))
-        if report is not None:
-            report(factor, here.state)
-        return points[-1].stiffness < left
-
-    here, factor = _followed(loading, most, near, soft)
+    design nearby, if Newton's steps from there keep every tangent definite. Raises NotConverged where there
+    is no unloaded equilibrium."""
+    here, factor = _followed(loading, most, near)
     if here is None:
         raise NotConverged(
             f"Structure {loading.number} as built has no unloaded equilibrium",
             state=loading.nominal.unloaded,
             remedy="Ask for smaller tolerances or for stiffer rods.",
         )
-    if not points:
-        soft(factor, here)
-    low = points[-1]
+    low = _point(loading, here, factor)
     if factor >= most and low.stiffness >= left:
         return BorneFactor(most, np.zeros(len(low.taut)), np.zeros(len(rates)))
     if low.stiffness >= left:
         above, high = factor + _RESOLUTION, None
     else:
         above, high = factor, low
-        low = points[-2] if len(points) > 1 else _stiff(loading, low, left)
+        low = _stiff(loading, low, left)
     for _ in range(_STEPS):
         for each in (low, high):
             if each is not None and abs(each.stiffness - left) <= exact * left:
@@ -143,21 +130,13 @@ def borne(
     raise _not_found(loading, low)
 
 
-def _followed(
-    loading: Loading,
-    most: float,
-    near: tuple[float, State] | None,
-    soft: Callable[[float, Here], bool],
-) -> tuple[Here | None, float]:
-    """The first state that is `soft`; where none is, at the factor `most` or at the end of the branch."""
+def _followed(loading: Loading, most: float, near: tuple[float, State] | None) -> tuple[Here | None, float]:
     if near is not None and near[0] < most:
         factor, state = near
         begin = loading.newton(state, factor * loading.load, limit=_SETTLING, tolerance=ON_THE_WAY)
         if begin is not None:
-            if soft(factor, begin):
-                return begin, factor
-            return loading.along(begin, factor, most, _NEAR, _RESOLUTION, enough=soft)
-    return loading.followed(most, CAREFUL, _RESOLUTION, enough=soft)
+            return loading.along(begin, factor, most, _NEAR, _RESOLUTION)
+    return loading.followed(most, CAREFUL, _RESOLUTION)
 
 
 def _between(low: _Point, above: float, high: _Point | None, left: float) -> float:

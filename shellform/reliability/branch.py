@@ -41,12 +41,11 @@ class Branch(WholeSteps):
         *,
         stops: Sequence[float] = (),
         heeding: bool = False,
-        enough: Callable[[float, Here], bool] | None = None,
     ) -> tuple[Here, float]:
         """The last state on the branch and its load factor, `most` where the branch goes on, from the state
-        `here` at the `factor` on; `report` is told each one's load factor and state, and the first of which
-        `enough` is true is the last. At `stops` on the way states are as near to equilibrium as at the end.
-        `heeding`: steps that may pass over an unstable stretch are halved (outlook.py)."""
+        `here` at the `factor` on; `report` is told each one's load factor and state. At `stops` on the way
+        states are as near to equilibrium as at the end. `heeding`: steps that may pass over an unstable
+        stretch are halved (outlook.py)."""
         ends = sorted({most, *(each for each in stops if factor < each < most)})
         width, good = step, 0
         outlook = Outlook(self.assembly, self.span, self.measure.mass_shape) if heeding else None
@@ -70,8 +69,6 @@ class Branch(WholeSteps):
             here, factor, view, good = there, goal, onward, good + 1
             if report is not None:
                 report(factor, here.state)
-            if enough is not None and enough(factor, here):
-                break
             if good == 2:
                 width, good = min(2.0 * width, step), 0
         return here, factor

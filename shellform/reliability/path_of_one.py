@@ -4,7 +4,7 @@ method).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import cast
@@ -39,9 +39,6 @@ _BESIDE = 10  # factorisations from the perfect structure's loaded state
 _RELAXATIONS = 150  # factorisations of a relaxation: what takes more has none
 SNAPS = 3  # local ones, that a structure may go on after
 _BEYOND = 2.0  # resolutions of its path, where a structure is relaxed that may have snapped
-_HALF = (
-    0.5  # of the load, from where a structure is relaxed under all of it where no smaller one is asked for
-)
 _SNAPPING, _LOOKS = 8, 8  # factorisations after which it is looked how far it has gone, and how often
 
 
@@ -167,17 +164,11 @@ class Loading(Branch):
         return replace(found, resting=resting, factorisations=self.spent)
 
     def borne(
-        self,
-        most: float,
-        step: float,
-        smallest: float,
-        *,
-        begin: tuple[float, State] | None = None,
-        marks: Sequence[float] = (),
+        self, most: float, step: float, smallest: float, *, marks: Sequence[float] = ()
     ) -> tuple[Here | None, float]:
-        """As `followed`, but going on after local snaps, which are kept in `snaps`: where the structure
-        falls."""
-        here, factor = self.followed(most, step, smallest, begin=begin, marks=marks)
+        """As `followed` from nothing, but going on after local snaps, which are kept in `snaps`: where the
+        structure falls."""
+        here, factor = self.followed(most, step, smallest, marks=marks)
         while here is not None and factor < most and len(self.snaps) < SNAPS:
             goal = min(factor + _BEYOND * smallest, most)
             there = self._rested(here, goal)
@@ -187,56 +178,26 @@ class Loading(Branch):
             here, factor = self.followed(most, step, smallest, begin=(goal, there.state), marks=marks)
         return here, factor
 
-    def told(self, marks: Sequence[float], smallest: float) -> tuple[Here | None, float]:
-        """Whether it bears the whole load or falls, as `borne` finds, and which of the other load factors in
-        `marks` it bears, but not where between them it falls: from the largest of them it is relaxed under
-        the whole load. Where it comes to rest beside, it bears that, be it after a snap or not; where a node
-        goes farther than FAR of the span, it has fallen. What lies between is followed."""
-        here, factor = self._unloaded(), 0.0
-        if here is None:
-            return None, factor
-        here, factor = self.along(here, factor, 1.0, STEP, _HALF)
-        if factor == 1.0:
-            return here, factor
-        below = max([_HALF, *(each for each in marks if each < 1.0)])
-        if factor < below:
-            here, factor = self.along(here, factor, below, below - factor, smallest)
-        if factor >= below:
-            rest, far = self._relaxed(here, 1.0, FAR * self.span)
-            if rest is None and far > FAR * self.span:
-                return here, factor
-            if rest is not None and far <= STRAY * self.span:
-                there = self.newton(rest, self.load, limit=2, tolerance=ON_THE_WAY)
-                if there is not None:
-                    return there, 1.0
-        return self.borne(1.0, 1.0 - factor, smallest, begin=(factor, here.state), marks=marks)
-
     def _rested(self, here: Here, goal: float) -> Here | None:
         """Where the structure comes to rest under the load factor `goal`, whose stable branch has ended
         `here` below it; None where a node goes farther than STRAY of the span: it falls."""
-        rest, far = self._relaxed(here, goal, STRAY * self.span)
-        if rest is None or far > STRAY * self.span:
-            return None
-        return self.newton(rest, goal * self.load, limit=2, tolerance=ON_THE_WAY)
-
-    def _relaxed(self, here: Here, goal: float, most: float) -> tuple[State | None, float]:
-        """The state in which the structure comes to rest under the load factor `goal`, and how far, m, a node
-        goes from `here`: None where it goes farther than `most`, or doesn't come to rest."""
-        state, load, far = here.state, goal * self.load, 0.0
+        state, load = here.state, goal * self.load
         for _ in range(_LOOKS):
             try:
                 rest = find_equilibrium(self.assembly, state, load, limit=_SNAPPING)
             except NotConverged as error:
                 self.spent += error.iterations
                 if not isinstance(error.state, State):
-                    return None, far
-                state, far = error.state, self._farthest(error.state, here.state)
-                if far > most:
-                    return None, far
+                    return None
+                state = error.state
+                if self._farthest(state, here.state) > STRAY * self.span:
+                    return None
                 continue
             self.spent += rest.factorisations
-            return rest.state, self._farthest(rest.state, here.state)
-        return None, far
+            if self._farthest(rest.state, here.state) > STRAY * self.span:
+                return None
+            return self.newton(rest.state, load, limit=2, tolerance=ON_THE_WAY)
+        return None
 
     def _farthest(self, state: State, before: State) -> float:
         """How far, m, the node has gone that has gone farthest."""
@@ -251,17 +212,15 @@ class Loading(Branch):
         begin: tuple[float, State] | None = None,
         marks: Sequence[float] = (),
         heeding: bool = False,
-        enough: Callable[[float, Here], bool] | None = None,
     ) -> tuple[Here | None, float]:
         """The last state on the stable branch and its load factor, `most` where the branch goes on; None
         where there is no unloaded state. With `begin` from a state at a load factor that is known to lie on
         the branch. The end is known to the `smallest` step, but next to factors in `marks`, where it decides
-        whether a structure stands, to MARKED. `heeding` what steps may pass over, and where it has gone
-        far `enough`: Branch.along."""
+        whether a structure stands, to MARKED. `heeding` what steps may pass over (Branch.along)."""
         factor, here = (0.0, self._unloaded()) if begin is None else (begin[0], self.at(begin[1]))
         if here is None:
             return None, factor
-        here, factor = self.along(here, factor, most, step, smallest, heeding=heeding, enough=enough)
+        here, factor = self.along(here, factor, most, step, smallest, heeding=heeding)
         for mark in sorted(marks):
             if factor < mark <= min(factor + 2.0 * smallest, most):
                 finest = min(MARKED, smallest)

@@ -4,7 +4,6 @@ start."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -32,8 +31,8 @@ class Perfect(Record):
 
     - `network`; `members`; `present` (c,): which of the candidate cables it has; dead `load` (n, 6).
     - `start`: the state in which its unloaded one is sought.
-    - `factors` (k,) of the load along its path, 0 first, as far as that goes, with the `states` there, none
-      where it isn't followed; `bears`: whether that is all of the load.
+    - `factors` (k,) of the load along its path, 0 first, as far as that goes, with the `states` there;
+      `bears`: whether that is all of the load.
     - `imperfections` of shape with which structures are drawn.
     """
 
@@ -50,13 +49,10 @@ class Perfect(Record):
     def __post_init__(self) -> None:
         object.__setattr__(self, "present", flags("present", self.present, (None,)))
 
-    @cached_property
+    @property
     def unloaded(self) -> State:
-        """The state without load; of one that isn't followed it is sought now. Raises NotConverged where
-        there is none."""
-        if self.states:
-            return self.states[0]
-        return find_equilibrium(assemble(self.network), self.start, np.zeros_like(self.load)).state
+        """The state without load."""
+        return self.states[0]
 
     def known_to(self, most: float) -> tuple[float, State]:
         """The largest factor of the load, up to `most`, to which the path is known, and the state there."""
@@ -73,27 +69,11 @@ def perfect(
     step: float = NOMINAL_STEP,
     heeding: bool = True,
 ) -> Perfect:
-    """The perfect structure of a design and its path under the dead `load` (n, 6), in steps of a share of it.
-    `heeding`: steps that may pass over an unstable stretch are halved (outlook.py). Raises NotConverged where
-    there is no unloaded state."""
+    """The perfect structure of a design and its path under the dead `load` (n, 6), in steps of a share of it;
+    0: it isn't followed, since drawn structures begin at its unloaded state. `heeding`: steps that may pass
+    over an unstable stretch are halved (outlook.py). Raises NotConverged where there is no unloaded state."""
     network, present = shell.network(design), np.asarray(design.present)
     return _perfect(network, members_of(shell), present, load, shell.target, shapes, step, heeding)
-
-
-def unfollowed(shell: Gridshell, design: Design, load: Reals, imperfections: Imperfections) -> Perfect:
-    """The perfect structure of a design without its path, with imperfections that are known: for drawn
-    structures that are taken on from states of their own."""
-    return Perfect(
-        network=shell.network(design),
-        members=members_of(shell),
-        present=np.asarray(design.present),
-        load=load,
-        start=shell.target,
-        factors=np.zeros(0),
-        states=(),
-        bears=False,
-        imperfections=imperfections,
-    )
 
 
 def perfect_of(model: Model, load: str, *, shapes: int = SOFT_MODES, step: float = NOMINAL_STEP) -> Perfect:
@@ -126,7 +106,7 @@ def _perfect(
     unloaded = find_equilibrium(assembly, target, none)
     kept: list[tuple[float, State]] = [(0.0, unloaded.state)]
     branch = Branch(assembly, load, members.span)
-    here = branch.at(unloaded.state)
+    here = branch.at(unloaded.state) if step > 0.0 else None
     reached = 0.0
     if here is not None:
         _, reached = branch.along(

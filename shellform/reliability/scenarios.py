@@ -24,7 +24,7 @@ from shellform.problem.terms import LoadedDesign, Measurement, Term
 from shellform.reliability.borne import CAREFUL, EXACT, BorneFactor, borne
 from shellform.reliability.drawing import Errors, Imperfections, built_beams, draw_errors
 from shellform.reliability.path_of_one import Loading
-from shellform.reliability.perfect import TO_ITS_END, perfect, unfollowed
+from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams
@@ -106,9 +106,8 @@ def scenarios(
 ) -> FactorsAsBuilt:
     """The drawn structures of the numbers in `least` under the `seed`, each with its number's `tolerances`,
     as scenarios of the load `case`, with the factors of it that they are to bear; imperfections of shape
-    follow the softest modes of this `design` to the last bit as in trials (trial_structures.py). Raises
-    NotConverged where it has no unloaded equilibrium."""
-    nominal = perfect(shell, design, case.force, step=TO_ITS_END, heeding=False)
+    follow the softest modes of this `design`. Raises NotConverged where it has no unloaded equilibrium."""
+    nominal = perfect(shell, design, case.force)
     left = _STIFFNESS_LEFT * float(modes(assemble(nominal.network), nominal.unloaded, 1).stiffness[0])
     own = tuple(
         Scenario(number, draw_errors(nominal.members, tolerances(number), seed, number), factor)
@@ -123,19 +122,16 @@ def remembered(shell: Gridshell, design: Design, asked: FactorsAsBuilt) -> Facto
     workshop = _workshop(shell, design, asked)
 
     def one(scenario: Scenario) -> Scenario | NotConverged:
-        passed: list[tuple[float, State]] = []
-
-        def followed(loading: Loading) -> tuple[float, State] | None:
-            end = _borne(asked, scenario, loading, report=lambda *at: passed.append(at))
-            goal = _BEFORE * end.factor
-            last = max((at for at in passed if at[0] <= goal), key=lambda at: at[0], default=None)
-            here, factor = loading.followed(goal, CAREFUL, _BEFORE_RESOLUTION, begin=last)
-            return None if here is None else (factor, here.state)
-
         try:
-            near = workshop.with_structure(scenario.errors, followed, number=scenario.number)
+            end = _end(workshop, asked, scenario)
         except NotConverged as error:
             return error
+
+        def followed(loading: Loading) -> tuple[float, State] | None:
+            here, factor = loading.followed(_BEFORE * end.factor, CAREFUL, _BEFORE_RESOLUTION)
+            return None if here is None else (factor, here.state)
+
+        near = workshop.with_structure(scenario.errors, followed, number=scenario.number)
         return replace(scenario, near=near)
 
     found = side_by_side(one, list(asked.scenarios))
@@ -158,29 +154,15 @@ def borne_factors(
 def _end(
     workshop: Workshop, asked: FactorsAsBuilt, scenario: Scenario, *, rates: tuple[Beams, ...] = ()
 ) -> BorneFactor:
-    followed = partial(_borne, asked, scenario, rates=rates)
+    def followed(loading: Loading) -> BorneFactor:
+        built = tuple(built_beams(rate, scenario.errors, asked.imperfections) for rate in rates)
+        return borne(
+            loading, left=asked.left, most=asked.most, rates=built, exact=asked.exact, near=scenario.near
+        )
+
     return workshop.with_structure(scenario.errors, followed, number=scenario.number)
 
 
-def _borne(
-    asked: FactorsAsBuilt,
-    scenario: Scenario,
-    loading: Loading,
-    *,
-    rates: tuple[Beams, ...] = (),
-    report: Callable[[float, State], None] | None = None,
-) -> BorneFactor:
-    built = tuple(built_beams(rate, scenario.errors, asked.imperfections) for rate in rates)
-    return borne(
-        loading,
-        left=asked.left,
-        most=asked.most,
-        rates=built,
-        exact=asked.exact,
-        near=scenario.near,
-        report=report,
-    )
-
-
 def _workshop(shell: Gridshell, design: Design, asked: FactorsAsBuilt) -> Workshop:
-    return Workshop(unfollowed(shell, design, asked.case.force, asked.imperfections))
+    nominal = perfect(shell, design, asked.case.force, shapes=0, step=0.0)
+    return Workshop(replace(nominal, imperfections=asked.imperfections))

@@ -144,18 +144,13 @@ class Workshop:
             errors, lambda own: self._ended(own, own.borne(most, step, resolution), most, tell)
         )
 
-    def rests(
-        self, errors: Errors, *, resolution: float, marks: Sequence[float] = (), where: bool = True
-    ) -> Limit:
+    def rests(self, errors: Errors, *, resolution: float, marks: Sequence[float] = ()) -> Limit:
         """As `fall`, up to the whole load, but a structure that rests under it beside the perfect one
-        (path_of_one.py) isn't loaded from nothing; unless it is asked `where` one falls, its factor is only
-        on the right side of those in `marks` and of the whole load."""
+        (path_of_one.py) isn't loaded from nothing."""
 
         def ended(own: Loading) -> Limit:
             beside = own.beside()
-            if beside is not None:
-                return self._ended(own, (beside, 1.0), 1.0, tell=False)
-            end = own.borne(1.0, STEP, resolution, marks=marks) if where else own.told(marks, resolution)
+            end = own.borne(1.0, STEP, resolution, marks=marks) if beside is None else (beside, 1.0)
             return self._ended(own, end, 1.0, tell=False)
 
         return self.with_structure(errors, ended)

@@ -11,10 +11,9 @@ The perfect structure's critical factor is asked for beside them, with an allowa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
@@ -37,7 +36,7 @@ _RESOLUTION = 1 / 32  # of the largest load, to which it is known where a struct
 class JudgedTrial:
     """Numbers of the structures that have `fallen` under each load as far as it took to say whether the
     design `stands`, whether the perfect one keeps its `critical` factor, the `factorisations` spent, and the
-    `factors` of the largest load on the design load's path that structures bear, as far as was asked."""
+    `factors` of the largest load on the design load's path that structures bear."""
 
     fallen: Mapping[str, tuple[int, ...]]
     critical: bool
@@ -69,9 +68,8 @@ class _Path:
         own = [each for each in order if self.of_design_load or each in self.asked.numbers]
         return [PERFECT, *own] if self.wanted > 0.0 else own
 
-    def borne(self, number: int, *, doubtful: Collection[int]) -> tuple[float, int]:
-        """The share of the largest load that a structure bears, and the factorisations spent; of those that
-        are `doubtful` only whether it is above the shares."""
+    def borne(self, number: int) -> tuple[float, int]:
+        """The share of the largest load that a structure bears, and the factorisations spent."""
         asked, marks = self.asked, tuple(self.shares.values())
         errors = draw_errors(self.nominal.members, asked.tolerances(number), asked.safety.seed + SEED, number)
         if number == PERFECT:  # whose path is known so far
@@ -85,9 +83,7 @@ class _Path:
                 heeding=False,  # a fifth of a trial; the design to build is judged heeding
             )
         else:
-            found = self.workshop.rests(
-                errors, resolution=_RESOLUTION, marks=marks, where=number not in doubtful
-            )
+            found = self.workshop.rests(errors, resolution=_RESOLUTION, marks=marks)
         return found.factor, found.factorisations
 
 
@@ -147,12 +143,10 @@ def try_structures(
     other samples, where they fell under the design load, have to stand under it and count under no other.
     Raises NotConverged where it has no unloaded equilibrium."""
     count = _Count(asked)
-    # what fell before falls again as a rule, and where it does costs most to find
-    doubtful = () if whole else frozenset(first)
     order = [*first, *(number for number in asked.numbers if number not in set(first))]
     for path in _paths(shell, design, asked, critical):
         queue = path.queue(order)
-        with closing(in_turn(partial(path.borne, doubtful=doubtful), queue)) as results:
+        with closing(in_turn(path.borne, queue)) as results:
             for loaded, number in enumerate(queue, start=1):
                 count.add(path, number, *next(results))
                 if loaded % _AT_ONCE and loaded < len(queue):

@@ -36,8 +36,8 @@ class Branch:
         return self.at(goal) if goal < 1.0 else None
 
 
-def found(monkeypatch, branch, begin, most=3.0, *, follow=None, **how):
-    monkeypatch.setattr(borne, "_followed", follow or (lambda *_: (SimpleNamespace(state=None), begin)))
+def found(monkeypatch, branch, begin, most=3.0, **how):
+    monkeypatch.setattr(borne, "_followed", lambda *_: (SimpleNamespace(state=None), begin))
     monkeypatch.setattr(borne, "_point", lambda _loading, _here, factor: branch.at(factor))
     monkeypatch.setattr(borne, "_moved", branch.moved)
     monkeypatch.setattr(borne, "_softest", lambda _loading, point, _rates: point)
@@ -160,50 +160,23 @@ def test_a_path_begins_at_the_state_of_a_design_nearby_or_where_that_is_none_of_
             calls.append(("newton", state, load[0, 0], limit, tolerance))
             return "begun" if self.settles else None
 
-        def along(self, begin, factor, most, step, resolution, *, enough):
-            calls.append(("along", begin, factor, most, step, resolution, enough))
+        def along(self, begin, factor, most, step, resolution):
+            calls.append(("along", begin, factor, most, step, resolution))
             return "near", factor
 
-        def followed(self, most, step, resolution, *, enough):
-            calls.append(("followed", most, step, resolution, enough))
+        def followed(self, most, step, resolution):
+            calls.append(("followed", most, step, resolution))
             return "nothing", 0.5
 
-    def soft(factor, here):
-        return (factor, here) == (0.75, "begun") and too_soft
-
-    loading, too_soft = Loading(), False
-    assert borne._followed(loading, 2.0, (0.75, "there"), soft) == ("near", 0.75)
+    loading = Loading()
+    assert borne._followed(loading, 2.0, (0.75, "there")) == ("near", 0.75)
     assert calls == [
         ("newton", "there", 0.75, 8, borne.ON_THE_WAY),
-        ("along", "begun", 0.75, 2.0, 1 / 16, 1 / 64, soft),
+        ("along", "begun", 0.75, 2.0, 1 / 16, 1 / 64),
     ]
     for near, settles in (((0.75, "there"), False), ((2.0, "there"), True), (None, True)):
         calls.clear()
         loading.settles = settles
-        assert borne._followed(loading, 2.0, near, soft) == ("nothing", 0.5)
-        assert calls[-1] == ("followed", 2.0, 1 / 8, 1 / 64, soft)
+        assert borne._followed(loading, 2.0, near) == ("nothing", 0.5)
+        assert calls[-1] == ("followed", 2.0, 1 / 8, 1 / 64)
         assert (calls[0][0] == "newton") == (near is not None and not settles)
-    too_soft = True
-    calls.clear()
-    assert borne._followed(loading, 2.0, (0.75, "there"), soft) == ("begun", 0.75)
-    assert [each[0] for each in calls] == ["newton"]
-
-
-def test_a_branch_isnt_followed_beyond_the_first_state_that_is_too_soft(monkeypatch):
-    """And the end is sought between that and the one before."""
-    branch, reached = Branch(), []
-
-    def followed(loading, most, near, soft):
-        for factor in (0.8, 0.9, 0.985, 0.995, 0.999):
-            reached.append(factor)
-            if soft(factor, SimpleNamespace(state=f"at {factor}")):
-                break
-        return SimpleNamespace(state=None), factor
-
-    told = []
-    monkeypatch.setattr(borne, "_stiff", None)
-    factor, _ = found(monkeypatch, branch, 0.0, follow=followed, report=lambda *at: told.append(at))
-    assert reached == [0.8, 0.9, 0.985, 0.995]
-    assert branch.stiffness(factor) == pytest.approx(LEFT, rel=borne.EXACT)
-    assert 0.985 < min(branch.looked) <= max(branch.looked) < 0.995
-    assert told == [(each, f"at {each}") for each in reached]

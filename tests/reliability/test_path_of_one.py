@@ -221,7 +221,7 @@ def test_a_snap_is_local_where_no_node_goes_farther_than_a_hundredth_of_the_span
 def test_the_end_of_a_branch_is_known_more_closely_next_to_marks(ends, marks, asked):
     ends, heard, first = list(ends), [], ends[-1]
 
-    def along(there, factor, most, step, smallest, *, heeding, enough=None):
+    def along(there, factor, most, step, smallest, *, heeding):
         heard.append((most, step, smallest))
         assert heeding is asked_heeding
         return there, told.pop(0)

@@ -8,7 +8,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.reliability import perfect as module
-from shellform.reliability.perfect import perfect, perfect_of, unfollowed
+from shellform.reliability.perfect import perfect, perfect_of
 from shellform.structure.elements.state import at_rest
 
 PLACES = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 0.25], [2.0, 0.0, 0.0]])
@@ -77,20 +77,12 @@ def test_a_structure_that_falls_on_the_way_does_not_bear_its_load(path):
     assert found.imperfections.shapes.shape == (0, 3, 6)
 
 
-def test_a_path_without_a_stable_begin_is_not_followed(path):
-    path.stable = False
-    found = perfect(SHELL, DESIGN, LOAD, shapes=0)
+@pytest.mark.parametrize(("step", "stable"), [(0.0, True), (0.5, False)])
+def test_a_path_is_not_followed_where_it_is_not_asked_for_or_has_no_stable_begin(path, step, stable):
+    path.stable = stable
+    found = perfect(SHELL, DESIGN, LOAD, shapes=0, step=step)
     assert (found.factors.tolist(), found.bears) == ([0.0], False)
     assert "along" not in [name for name, *_ in path.seen]
-
-
-def test_the_unloaded_state_of_one_that_is_not_followed_is_sought_once_when_it_is_asked_for(path):
-    found = unfollowed(SHELL, DESIGN, LOAD, "known")
-    assert (found.imperfections, found.bears, found.states) == ("known", False, ())
-    assert path.seen == []
-    assert found.unloaded is found.unloaded
-    assert found.unloaded == "unloaded"
-    assert [name for name, *_ in path.seen] == ["unloaded"]
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,9 @@ from shellform.problem.evaluation import Evaluator
 from shellform.problem.problem import LoadCase
 from shellform.problem.terms import LoadedDesign
 from shellform.reliability import borne
-from shellform.reliability import perfect as perfect_module
 from shellform.reliability import scenarios as scenarios_module
 from shellform.reliability.drawing import PERFECT, draw_errors
-from shellform.reliability.path_of_one import Loading
-from shellform.reliability.perfect import TO_ITS_END, perfect
+from shellform.reliability.perfect import perfect
 from shellform.reliability.scenarios import FactorsAsBuilt, Scenario, borne_factors, remembered, scenarios
 from shellform.reliability.standing import Workshop
 from shellform.structure.answers.sensitivity import stiffness_rate
@@ -109,29 +107,6 @@ def test_a_remembered_structure_bears_the_same_as_one_that_is_loaded_from_nothin
         assert 0.8 * factor < scenario.near[0] <= 0.9 * factor
     nearby = replace(design, rest_length=0.999 * design.rest_length)
     assert factors(dome, nearby, known) == pytest.approx(factors(dome, nearby, asked), rel=1e-6)
-
-
-def test_a_remembered_structure_needs_no_equilibrium_of_the_perfect_one(dome, asked, monkeypatch):
-    design = dome.design()
-    known = remembered(dome, design, asked)
-
-    def never(*_, **__):
-        raise AssertionError("the unloaded state of the perfect structure was sought")
-
-    monkeypatch.setattr(perfect_module, "find_equilibrium", never)
-    assert factors(dome, design, known).min() > 0.0
-
-
-def test_what_is_remembered_is_loaded_from_nothing_once(dome, asked, monkeypatch):
-    begun, own = [], Loading._unloaded
-    monkeypatch.setattr(Loading, "_unloaded", lambda loading: begun.append(loading.number) or own(loading))
-    remembered(dome, dome.design(), asked)
-    assert sorted(begun) == sorted(each.number for each in asked.scenarios)
-
-
-def test_scenarios_have_the_shapes_of_trials_to_the_last_bit(dome, case, asked):
-    tried = perfect(dome, dome.design(), case.force, step=TO_ITS_END, heeding=False)
-    np.testing.assert_array_equal(asked.imperfections.shapes, tried.imperfections.shapes)
 
 
 def test_where_no_state_nearby_is_known_that_leads_to_the_branch_it_is_loaded_from_nothing(dome, asked):
@@ -233,7 +208,7 @@ def test_scenarios_keep_a_tenth_of_the_unloaded_structure_s_softest_stiffness(mo
     nominal = SimpleNamespace(
         network="network", unloaded="unloaded", members="members", imperfections="shapes"
     )
-    monkeypatch.setattr(scenarios_module, "perfect", lambda *_, step, heeding: nominal)
+    monkeypatch.setattr(scenarios_module, "perfect", lambda *_: nominal)
     monkeypatch.setattr(scenarios_module, "assemble", lambda network: network)
     monkeypatch.setattr(
         scenarios_module,
@@ -260,32 +235,29 @@ def test_scenarios_keep_a_tenth_of_the_unloaded_structure_s_softest_stiffness(mo
 
 
 def test_a_scenario_is_remembered_at_nine_tenths_of_what_it_bears(monkeypatch):
-    """From the last state before that through which its end was found. The second has no such state, and of
-    the third no end is found."""
+    """The second has no such state, and of the third no end is found."""
     seen = []
 
-    def end(loading, *, report, **_):
-        if loading.number == 9:
+    def end(workshop, asked, scenario):
+        if scenario.number == 9:
             raise NotConverged("lost")
-        for factor in (0.25, 0.5, 0.6):
-            report(factor, f"at {factor}")
-        return SimpleNamespace(factor=0.5 + 0.1 * loading.number)
+        return SimpleNamespace(factor=0.5 + 0.1 * scenario.number)
 
     class Making:
         def with_structure(self, errors, work, *, number):
-            def followed(*given, begin):
-                seen.append((errors, number, given, begin))
+            def followed(*given):
+                seen.append((errors, number, given))
                 return (None if number == 2 else SimpleNamespace(state="near")), 0.7
 
-            return work(SimpleNamespace(followed=followed, number=number))
+            return work(SimpleNamespace(followed=followed))
 
-    monkeypatch.setattr(scenarios_module, "borne", end)
+    monkeypatch.setattr(scenarios_module, "_end", end)
     monkeypatch.setattr(scenarios_module, "_workshop", lambda *_: Making())
     found = remembered(None, None, told_scenarios({1: 1.0, 2: 1.0, 9: 1.0}))
     assert [(each.number, each.near) for each in found.scenarios] == [(1, (0.7, "near")), (2, None)]
     assert sorted(seen, key=lambda each: each[1]) == [
-        ("errors 1", 1, (pytest.approx(0.54), borne.CAREFUL, 1 / 16), (0.5, "at 0.5")),
-        ("errors 2", 2, (pytest.approx(0.63), borne.CAREFUL, 1 / 16), (0.6, "at 0.6")),
+        ("errors 1", 1, (pytest.approx(0.54), borne.CAREFUL, 1 / 16)),
+        ("errors 2", 2, (pytest.approx(0.63), borne.CAREFUL, 1 / 16)),
     ]
     with pytest.raises(NotConverged, match="lost"):
         remembered(None, None, told_scenarios({9: 1.0}))

@@ -87,9 +87,9 @@ class Tried:
     def __call__(self, _nominal):
         return self
 
-    def rests(self, errors, *, resolution, marks, where):
+    def rests(self, errors, *, resolution, marks):
         number, load = errors
-        self.loaded.append((load, number, resolution, marks, where))
+        self.loaded.append((load, number, resolution, marks))
         return SimpleNamespace(factor=self.factors[number], factorisations=10 + number)
 
     def limit(self, errors, **how):
@@ -107,7 +107,7 @@ def test_structures_fall_under_the_loads_that_they_do_not_bear_and_refuse_where_
     assert found.fallen == {"wet": (3, 5), "wetter": (1, 2, 3, 5)}
     assert (found.stands, found.critical, found.factorisations) == (True, True, 75)
     assert found.factors == factors
-    assert {each[0:3:2] for each in made.loaded} == {(-15.0, 1 / 32)}
+    assert {each[::2] for each in made.loaded} == {(-15.0, 1 / 32)}
     assert made.loaded[0][3] == (1.0, pytest.approx(0.8))
     for may in ({"wet": 1, "wetter": 4}, {"wet": 2, "wetter": 3}):
         assert not made.judged(asked_of(may)).stands
@@ -127,16 +127,6 @@ def test_no_more_structures_are_loaded_than_it_takes_to_refuse_but_where_the_who
     late = Tried({**dict.fromkeys(range(8), 1.0), 8: 0.9, 9: 0.9}, monkeypatch)
     found = late.judged(asked, first=(9, 8))
     assert (found.fallen["wetter"], set(found.factors)) == ((9, 8), {9, 8, 0, 1})
-
-
-def test_where_a_structure_falls_is_not_asked_of_one_that_fell_before_unless_the_whole_sample_is(monkeypatch):
-    made = Tried({**dict.fromkeys(range(6), 1.0), 2: 0.8}, monkeypatch)
-    asked = asked_of({"wet": 6, "wetter": 6})
-    made.judged(asked, first=(2, 4))
-    assert {number for _, number, *_, where in made.loaded if not where} == {2, 4}
-    made.loaded.clear()
-    made.judged(asked, first=(2, 4), whole=True)
-    assert all(where for *_, where in made.loaded)
 
 
 def test_structures_of_other_samples_count_under_the_design_load_alone(monkeypatch):
