@@ -8,7 +8,7 @@ from shellform.site.ways_up import WayUp, ways_up
 
 
 def raised(shell: Gridshell, design: Design) -> tuple[WayUpRecord, ...]:
-    """The ways up that were tried of a design, the easiest first."""
+    """The ways up of a design, as they were tried."""
     return tuple(_recorded(way) for way in ways_up(shell, design))
 
 
