@@ -32,7 +32,7 @@ from shellform.net.ground import Ground, ground_under
 from shellform.net.net import EdgeLine, Net, Stretch
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.polylines import nearest
-from shellform.net.rims import End, Rim, ends_of, rim_of
+from shellform.net.rims import End, Rim, edges_of, ends_of
 from shellform.quantities import coordinates
 from shellform.structure.elements.rotation import from_matrices
 from shellform.structure.elements.state import State
@@ -154,8 +154,7 @@ def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals 
 def stretches_of(surface: Surface, edges: Edges = Edges()) -> tuple[Stretch, ...]:
     """What the surface's edges are, before there is a net: a first look."""
     ground, found = ground_under(surface, edges.ground), list[Stretch]()
-    for number, loop in enumerate(surface.boundary):
-        rim = rim_of(surface.vertices[loop], number > 0)
+    for rim in edges_of(surface):
         _sort_out(rim, edges, ground)
         found += _stretches(rim)
     return tuple(found)

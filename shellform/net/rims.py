@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Indices, Reals, Record
+from shellform.net.ground import LOW
 from shellform.net.net import Net
 from shellform.net.polylines import closed, nearest
 from shellform.structure.elements.rotation import matrices
@@ -57,13 +58,13 @@ def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End
     nodes, place = net.rod_ends, net.target.positions
     upwards = matrices(net.target.quaternions[nodes])[:, :, 2]
     middle = place[nodes] - net.grid.layer[nodes, None] * upwards
-    curves = [surface.vertices[loop] for loop in surface.boundary]
+    rims = edges_of(surface)
+    curves = [rim.points for rim in rims]
     starts = np.cumsum([0, *(len(each) for each in curves)])
     a = np.vstack(curves)
     b = np.vstack([np.roll(each, -1, axis=0) for each in curves])
     piece, closest, away = Tree(np.stack([a, b, b], axis=1)).nearest(middle)
     cut = np.flatnonzero(away > _OFF * net.grid.scale)
-    rims = [rim_of(points, number > 0) for number, points in enumerate(curves)]
     found = []
     order: dict[int, tuple[int, int]] = {}
     if len(cut):
@@ -88,6 +89,29 @@ def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End
         near = first if 2.0 * part < rim.along[first + 1] - rim.along[first] else first + 1
         found.append(End(node, number, float(rim.along[first] + part), near % len(rim.points), middle[k]))
     return found, rims
+
+
+def edges_of(surface: Surface) -> list[Rim]:
+    """The surface's edges, the outer one first. Where its mesh is coarse they have points between vertices,
+    which lie no farther apart than what counts as low over the ground is high: of a long side of a triangle
+    that comes down to a foot, half would stand on the ground."""
+    step = LOW * float(surface.size[:2].max())
+    return [
+        rim_of(_divided(surface.vertices[loop], step), number > 0)
+        for number, loop in enumerate(surface.boundary)
+    ]
+
+
+def _divided(points: Reals, step: float) -> Reals:
+    """The points (k, 3), m, of a closed curve with others evenly between those that lie farther apart than
+    `step`, m."""
+    away = np.roll(points, -1, axis=0) - points
+    parts = np.maximum(np.ceil(np.linalg.norm(away, axis=1) / step - 1e-9).astype(np.int64), 1)
+    at = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    return np.asarray(
+        np.repeat(points, parts, axis=0)
+        + (at / np.repeat(parts, parts))[:, None] * np.repeat(away, parts, axis=0)
+    )
 
 
 def rim_of(points: Reals, opening: bool, *, cut: bool = False) -> Rim:

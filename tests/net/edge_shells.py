@@ -15,15 +15,17 @@ def _sheet(place, rows, columns, *, closed=False):
     return make_surface(place, np.array(triangles))
 
 
-def barrel(length=0.8, radius=0.5, half=0.9, raised=0.0):
-    """A barrel vault on two straight lines along x, an arch at either end; `raised` m over z = 0."""
+def barrel(length=0.8, radius=0.5, half=0.9, raised=0.0, across=40):
+    """A barrel vault on two straight lines along x, an arch of `across` vertices at either end; `raised` m
+    over z = 0."""
     x, angle = (
         each.ravel()
-        for each in np.meshgrid(np.linspace(-length / 2, length / 2, 40), np.linspace(-half, half, 40),
-        indexing="ij")
-    )  # fmt: skip
+        for each in np.meshgrid(
+            np.linspace(-length / 2, length / 2, 40), np.linspace(-half, half, across), indexing="ij"
+        )
+    )
     place = np.column_stack([x, radius * np.sin(angle), radius * (np.cos(angle) - np.cos(half)) + raised])
-    return _sheet(place, 40, 40)
+    return _sheet(place, 40, across)
 
 
 def oculus(radius=0.6, hole=0.12, rise=0.22):

@@ -6,7 +6,7 @@ import pytest
 import shellform as sf
 from shellform.case.build_net import edge_records
 from shellform.errors import InputError
-from shellform.net.edges import Edges, Place, _near, stand
+from shellform.net.edges import Edges, Place, _near, stand, stretches_of
 from shellform.net.notes import NoteKind
 from shellform.net.rims import _chains
 from shellform.net.saved import load_net, net_document, save_net
@@ -130,6 +130,17 @@ def test_nothing_is_held_above_the_ground_unasked(vault_of_two_arches, round_ope
         low = 0.02 * surface.size[:2].max() + 0.5 * net.grid.gap
         assert found.target.positions[found.supports, 2].max() <= low
         assert net.target.positions[net.supports, 2].max() > 5 * low
+
+
+def test_rods_end_on_the_edge_beam_down_to_its_foot_however_coarse_the_mesh():
+    """Arches of five sides of 0.18 m: of the lowest ones half would count as ground, 0.05 m over it."""
+    surface = barrel(across=6)
+    found = stand(pulled(surface), surface)
+    low = 0.02 * surface.size[:2].max()
+    assert found.target.positions[found.supports, 2].max() <= low + 0.5 * found.grid.gap
+    for stretches in (found.stretches, stretches_of(surface)):
+        assert [each.kind for each in stretches] == ["ground", "beam"] * 2
+        assert max(each.points[:, 2].max() for each in stretches[::2]) <= low
 
 
 def test_every_rod_s_end_is_held_or_clamped_to_an_edge_beam_by_half_the_gap(
