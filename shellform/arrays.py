@@ -126,6 +126,14 @@ def frozen(raw: NDArray[_T]) -> NDArray[_T]:
     return copy
 
 
+def read_only(raw: NDArray[_T]) -> NDArray[_T]:
+    """A read-only view. A loop is compiled for arrays that can be written to and again for those that can't:
+    what it doesn't write to is given to it as this, whichever it is."""
+    view = raw.view()
+    view.setflags(write=False)
+    return view
+
+
 def _told(value: object) -> str:
     """`value` in a line; by its size an array, tuple, list or dictionary of more than `_FEW` entries."""
     if isinstance(value, np.ndarray):

@@ -44,9 +44,8 @@ def dome():
     return braced(net, surface)
 
 
-@pytest.fixture(scope="session")
-def built(shell):
-    """The vault with every second cable, in states that stand for solved ones: nodes sink with their
+def built_as(shell):
+    """A gridshell with every second cable, in states that stand for solved ones: nodes sink with their
     height.
     """
     present = np.arange(len(shell.cable_ends)) % 2 == 0
@@ -64,6 +63,11 @@ def built(shell):
         "test",
         "The vault",
     )
+
+
+@pytest.fixture(scope="session")
+def built(shell):
+    return built_as(shell)
 
 
 @pytest.fixture(scope="session")

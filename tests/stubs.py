@@ -16,7 +16,7 @@ CASE = f"""
 file = "{ROOT / "surfaces/dome.py"}"
 size = 0.03
 [net]
-spacing = 0.12
+spacing = 0.15
 angle = 45
 elements = 2
 [rod]

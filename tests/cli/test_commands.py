@@ -354,7 +354,7 @@ def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
     arguments = ["design", "scripts/scale_model.toml", "--output", run]
     for setting in (
         "surface.size=0.02",
-        "net.spacing=0.08",
+        "net.spacing=0.1",
         "net.elements=2",
         "load.force=5.0",
         "optimise.evaluations=5",

@@ -45,9 +45,10 @@ def test_check_tells_numbers_in_json_that_its_lines_tell_in_words(made):
 
 def test_a_net_alone_is_told_in_json_or_not_at_all(tmp_path):
     surface = ROOT / "surfaces/dome.py"
-    told = shellform("net", surface, "--spacing", "0.1", "--output", tmp_path / "told", "--json")
+    net = ("net", surface, "--spacing", "0.15", "--angle", "45", "--output")
+    told = shellform(*net, tmp_path / "told", "--json")
     assert json.loads(told.stdout) == json.loads((tmp_path / "told/summary.json").read_text(encoding="utf-8"))
-    quiet = shellform("net", surface, "--spacing", "0.1", "--output", tmp_path / "quiet", "--quiet")
+    quiet = shellform(*net, tmp_path / "quiet", "--quiet")
     assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
 
 

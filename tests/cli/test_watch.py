@@ -43,7 +43,7 @@ def test_changes_of_case_and_surface_are_taken_up_and_bad_input_is_waited_out_un
     said = Lines(job.stderr)
     try:
         said.until("waiting for a change of dome.toml or dome.py")
-        case.write_text(text.replace("spacing = 0.12", "spacing = 0.13"), encoding="utf-8")
+        case.write_text(text.replace("spacing = 0.15", "spacing = 0.16"), encoding="utf-8")
         said.until("surface: kept")
         said.until("waiting for a change")
         case.write_text("[net", encoding="utf-8")

@@ -194,9 +194,12 @@ def test_a_corrugated_barrel_is_covered_at_an_angle_where_rods_run_far_past_its_
 
 
 def test_a_net_that_creases_bring_nearer_than_its_spacing_says_so_and_is_none_where_none_may_be(
-    umbrella, tighter
+    umbrella, tighter, monkeypatch
 ):
     (told,) = (note.text for note in tighter.notes if note.kind is NoteKind.NEAR)
     assert "nearer than their spacing" in told
+    # no further than where that net is found
+    rungs = tuple(rung for rung in LADDER if rung.change in (Change.NOTHING, Change.TIGHTER))
+    monkeypatch.setattr("shellform.net.ladder.LADDER", rungs)
     with pytest.raises(NoNet, match="nearer than their spacing"):
         climbed_net(umbrella, SETTINGS, angle=math.pi / 4, near=False)

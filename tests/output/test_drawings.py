@@ -15,6 +15,7 @@ from shellform.net.grid import lattice_grid
 from shellform.output.workshop import drawings, layout, nesting, schedules, setting_out
 from shellform.output.workshop.marks import PENS, Span, Stroke, Words, overlap
 from shellform.output.workshop.schedules import TitleBlock
+from tests.conftest import built_as
 
 
 @pytest.fixture(scope="module")
@@ -317,11 +318,11 @@ def test_drawings_that_can_not_be_written_leave_nothing_behind(built, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_the_title_block_says_who_drew_it_and_when_as_the_case_does(built, tmp_path):
+def test_the_title_block_says_who_drew_it_and_when_as_the_case_does(dome, tmp_path):
     block = TitleBlock("2026-05-31", "B", "A. Author")
-    told = replace(built, block=block)
+    told = replace(built_as(dome), block=block)
     for name in ("first", "second"):
-        drawings.write_drawings(tmp_path / name, told, nesting.cut(built.grid, stock=0.6))
+        drawings.write_drawings(tmp_path / name, told, nesting.cut(told.grid, stock=0.6))
     for file in sorted((tmp_path / "first").iterdir()):
         assert file.read_bytes() == (tmp_path / "second" / file.name).read_bytes()
     text = PdfReader(tmp_path / "first/elevations.pdf").pages[0].extract_text()

@@ -22,7 +22,8 @@ from shellform.run.run import run_case
 from tests.stubs import CASE
 
 ROOT = Path(__file__).parent.parent.parent
-PLAIN = ["safety.required=false", "cable.without=false", "optimise.unloaded=false"]  # one design, by itself
+ALONE = ["cable.without=false", "optimise.unloaded=false"]  # without designs to compare with
+PLAIN = ["safety.required=false", *ALONE]
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +79,8 @@ def test_a_net_that_is_kept_is_told_with_the_rods_of_the_case_as_it_is(file, tmp
 
 
 def test_wishes_for_cables_are_kept_and_told_in_summary_schedule_and_page(file, tmp_path, undrawn):
-    most = 80
-    wishes = [f"optimise.cables_max={most}", "optimise.symmetric=true", "optimise.polish=2"]
+    most = 50
+    wishes = [*ALONE, f"optimise.cables_max={most}", "optimise.symmetric=true", "optimise.polish=2"]
     case = load_case(file, [*wishes, "cable.adjustment=0.004"])
     summary = run_case(case, tmp_path, until="optimise")
     found = summary.optimisation
@@ -148,11 +149,11 @@ def test_a_stage_that_fails_leaves_the_others_to_be_made_and_is_made_by_the_next
     with monkeypatch.context() as broken:
         broken.setattr(run, f"_{stage}", failing)
         with pytest.raises(InputError, match="is full"):
-            run_case(load_case(file), tmp_path)
+            run_case(load_case(file, ALONE), tmp_path)
     assert set(listed(tmp_path)) == set(STAGES) - {stage}
     assert read_run(tmp_path).summary.failed == {stage: f"{stage}: is full"}
     assert f"The stage “{stage}” failed" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    run_case(load_case(file), tmp_path)
+    run_case(load_case(file, ALONE), tmp_path)
     assert set(listed(tmp_path)) == set(STAGES)
     assert not read_run(tmp_path).summary.failed
 

@@ -87,6 +87,16 @@ def as_obj(file, surface):
     return file
 
 
+@pytest.fixture(scope="module", autouse=True)
+def few_drawn():
+    """Of what stands eight structures are drawn instead of forty; how many are is tested in
+    test_first_judgements.py, and a search with all of them in tests/cli/test_quiet.py."""
+    with pytest.MonkeyPatch.context() as changed:
+        for module in ("first_design", "first_finish", "first_trial"):
+            changed.setattr(f"shellform.run.{module}.DRAWN", 8)
+        yield
+
+
 @pytest.fixture(scope="module")
 def proposed(tmp_path_factory):
     """The dome's case with one angle tried, and what was told."""

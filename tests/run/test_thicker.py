@@ -15,11 +15,19 @@ from shellform.records.as_built import AsBuilt
 from shellform.records.remedies import RodsOf, rounded_up
 from shellform.reliability.standing import sample
 from shellform.run import thicker
-from shellform.run.thicker import DRAWN, rods_that_stand
+from shellform.run.thicker import rods_that_stand
 from shellform.structure.elements.sections import Round
 
 AS_BUILT = Tolerances(cable_length=1e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
 ASKED = AsBuilt(0.99, None, 200)
+DRAWN = 12  # structures of each size of rods, instead of forty
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_drawn():
+    with pytest.MonkeyPatch.context() as changed:
+        changed.setattr(thicker, "DRAWN", DRAWN)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -127,18 +127,18 @@ def test_groups_lift_way_points_weight_and_a_load_are_stages_of_their_own(shell)
         assert shares[0] == 0.0 or stage.startswith("tightening") or stage == "loading"
 
 
-def test_erections_that_can_t_be_are_refused(shell):
-    design = shell.design()
+def test_erections_that_can_t_be_are_refused(dome):
+    design = dome.design()
     with pytest.raises(InputError, match=r"between 0.0001 and 1.*a share of the way"):
-        erect(shell, design, step=0.0)
+        erect(dome, design, step=0.0)
     with pytest.raises(InputError, match="every cable of the design once"):
-        erect(shell, design, groups=[[0, 1]], step=1.0)
+        erect(dome, design, groups=[[0, 1]], step=1.0)
     with pytest.raises(NotConverged, match=r"doesn't stand under the weight.*smaller weight"):
-        erect(shell, design, weight=1e4 * shell.point_load(1.0), step=1.0)
+        erect(dome, design, weight=1e4 * dome.point_load(1.0), step=1.0)
     with pytest.raises(NotConverged, match="bears 0"):
-        erect(shell, shell.unbraced(), load=shell.point_load(30.0), step=0.5)
+        erect(dome, dome.unbraced(), load=dome.point_load(30.0), step=0.5)
     with pytest.raises(NotConverged, match="loses stability"):
-        erect(shell, replace(design, rest_length=0.6 * design.rest_length), step=0.5)
-    apart = 1.2 * shell.target.positions[shell.net.supports]
+        erect(dome, replace(design, rest_length=0.6 * design.rest_length), step=0.5)
+    apart = 1.2 * dome.target.positions[dome.net.supports]
     with pytest.raises(NotConverged, match="No stable path"):
-        erect(shell, shell.unbraced(), way=[-apart], step=0.5)
+        erect(dome, dome.unbraced(), way=[-apart], step=0.5)

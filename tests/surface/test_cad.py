@@ -13,6 +13,7 @@ from shellform.surface import cad
 from shellform.surface.occ import gmsh, session, silence
 from shellform.surface.readers import draft
 from shellform.surface.readers.reading import read_surface
+from shellform.surface.readers.script import load_script
 
 ROOT = Path(__file__).parent.parent.parent
 DATA = ROOT / "tests/data"
@@ -407,3 +408,12 @@ def test_of_two_domes_that_do_not_touch_each_can_be_taken(tmp_path, ending, unit
         read_surface(file, unit=unit)
     for piece, size in ((1, [6.0, 6.0, 1.2]), (2, [1.0, 1.0, 0.4])):
         np.testing.assert_allclose(read_surface(file, unit=unit, piece=piece).size, size, atol=0.02)
+
+
+def test_a_script_is_run_as_it_is_and_leaves_nothing_beside_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    for height in ("1.0", "2.0"):
+        file = script(tmp_path, f"HEIGHT = {height}\n")
+        os.utime(file, (1e9, 1e9))  # as copied with its time, or saved twice in a second
+        assert f"{load_script(file).HEIGHT}" == height
+    assert list(tmp_path.iterdir()) == [file]

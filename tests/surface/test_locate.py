@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from shellform.surface.shape import jets, locate, tree
 from shellform.surface.shape.locate import Locator
 from shellform.surface.shape.patch import controls, evaluate
 from shellform.surface.shape.target import Surface, curvature, make_surface
@@ -217,3 +218,15 @@ def test_a_surface_with_every_second_face_turned_over_is_mended():
     again = make_surface(surface.vertices, faces)
     assert isinstance(again, Surface)
     assert again.normals[:, 2].min() > 0.3
+
+
+def test_loops_are_compiled_once_for_points_that_may_be_written_to_and_for_those_that_may_not():
+    surface, _ = wave(9)
+    free = surface.vertices + np.array([0.0, 0.0, 0.1])
+    kept = free.copy()
+    kept.setflags(write=False)
+    for points in (free, kept):
+        Locator(surface).foot(points[:2])
+        jets.jets(points, surface.triangles, surface.normals)
+    for loop, place in ((locate._feet_run, 1), (tree._search_run, 0), (tree._morton, 0), (jets._jets, 0)):
+        assert {signature[place].mutable for signature in loop.signatures} == {False}

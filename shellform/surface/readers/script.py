@@ -24,7 +24,8 @@ def load_script(path: Path) -> ModuleType:
         raise InputError("isn't a Python script", where=str(path), remedy="Builder scripts end in .py.")
     module = importlib.util.module_from_spec(spec)
     try:
-        spec.loader.exec_module(module)
+        # not by its loader, which keeps what it compiles beside the script and takes it up by time and size
+        exec(compile(path.read_bytes(), str(path), "exec", dont_inherit=True), module.__dict__)
     except (Exception, SystemExit) as error:  # whatever somebody's script raises
         raise InputError(
             f"the script fails: {type(error).__name__}: {error}",

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, read_only
 from shellform.compiled import njit, prange
 
 _MOST = 96  # neighbours
@@ -23,9 +23,11 @@ def jets(points: Reals, faces: Indices, normals: Reals) -> tuple[Reals, Reals]:
     """Unit normals (v, 3) and principal curvatures (v, 2), 1/m, positive where the surface bends away from
     its upper side.
     """
+    points, normals = (read_only(np.ascontiguousarray(each)) for each in (points, normals))
+    faces = read_only(faces)
     first, owner = corners_at(faces, len(points))
     unit, bent = np.empty((len(points), 3)), np.empty((len(points), 2))
-    _jets(np.ascontiguousarray(points), faces, np.ascontiguousarray(normals), first, owner, unit, bent)
+    _jets(points, faces, normals, first, owner, unit, bent)
     return unit, bent
 
 

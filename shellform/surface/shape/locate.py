@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals, Record
+from shellform.arrays import Flags, Indices, Reals, Record, read_only
 from shellform.compiled import njit, prange
 from shellform.surface.shape.extension import extended
 from shellform.surface.shape.patch import controls, edge_cubic, evaluate
@@ -65,7 +65,7 @@ class Locator:
 
     def foot(self, points: Reals) -> Foot:
         """The feet of points (k, 3) on the smooth surface and its extension."""
-        query = np.ascontiguousarray(points, dtype=float)
+        query = read_only(np.ascontiguousarray(points, dtype=float))
         triangle, closest, _ = self.facet(query)
         count = len(query)
         point, normal, distance, hessian = (

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, read_only
 from shellform.compiled import njit, prange
 
 _LEAF = 4  # triangles in a leaf
@@ -31,7 +31,7 @@ class Tree:
         """The triangle (k,), the closest point (k, 3) on it and the distance (k,) of each of points (k,
         3).
         """
-        query = np.ascontiguousarray(points, dtype=float)
+        query = read_only(np.ascontiguousarray(points, dtype=float))
         triangle, closest, gap = (
             np.empty(len(query), dtype=np.int64),
             np.empty_like(query),
