@@ -19,6 +19,7 @@ from shellform import quantities
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Draft, choosable, without_unused
+from shellform.surface.readers.outliers import without_outliers
 from shellform.surface.readers.seams import sewn, without_slivers
 from shellform.surface.readers.sides import pieces_of, shared_edges, side_of
 from shellform.surface.readers.teeth import without_teeth
@@ -66,7 +67,8 @@ def mended(draft: Draft, where: str, *, face: str | None = None, piece: int | No
                 "faces were turned the same way as the others",
             ),
         )
-    return without_teeth(_parted(_open(without_slivers(draft), face, where), size))
+    draft = without_slivers(without_outliers(draft))
+    return without_teeth(_parted(_open(draft, face, where), size))
 
 
 def turned_alike(triangles: Indices, where: str) -> Indices:
