@@ -8,6 +8,7 @@ are turned alike; slivers are collapsed or flipped; of a closed skin the upper o
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -196,7 +197,7 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
     order = np.argsort(-area, kind="stable")
     if piece is None:
         others = choosable(draft)
-        listed = ", ".join(f"{area[k]:.3g}" for k in order[:_PIECES_TOLD]) + (
+        listed = ", ".join(quantities.number(area[k]) for k in order[:_PIECES_TOLD]) + (
             " …" if count > _PIECES_TOLD else ""
         )
         raise InputError(
@@ -218,8 +219,13 @@ def _choices(draft: Draft, label: Indices, pieces: Indices) -> str:
     told = []
     for number, piece in enumerate(pieces.tolist(), 1):
         points = draft.points[np.unique(draft.triangles[label == piece])]
-        size = " × ".join(f"{extent:.3g}" for extent in np.ptp(points, axis=0))
-        middle = ", ".join(f"{x:.3g}" for x in 0.5 * (points.min(axis=0) + points.max(axis=0)))
+        extent = np.ptp(points, axis=0)
+        size = " × ".join(f"{each:.3g}" for each in extent)
+        # to a hundredth of its size, however far from the origin
+        places = 2 - math.floor(math.log10(extent.max()))
+        middle = ", ".join(
+            f"{round(x, places):.12g}" for x in 0.5 * (points.min(axis=0) + points.max(axis=0))
+        )
         told.append(f"--piece {number} is {size} m about ({middle})")
     return ", ".join(told)
 
