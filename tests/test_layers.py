@@ -41,7 +41,7 @@ FLOORS = {
         ["units", "shape", "bounded"],
         ["readers.draft", "readers.script", "readers.nurbs", "readers.stated", "readers.allowance"],
         ["readers.seams", "readers.sides"],
-        ["readers.teeth"],
+        ["readers.outliers", "readers.teeth"],
         ["readers.mend"],
         ["occ"],
         ["imports"],

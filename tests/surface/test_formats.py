@@ -200,6 +200,13 @@ def test_of_several_compas_meshes_one_has_to_be_named(tmp_path):
     np.testing.assert_allclose(read_surface(tmp_path / "two.json", name="big").size, np.array(SIZE) * 2)
 
 
+def test_of_very_many_compas_meshes_the_first_names_are_told(tmp_path):
+    (tmp_path / "many.json").write_text(json.dumps([compas_mesh(POINTS, QUADS)] * 210))
+    with pytest.raises(InputError) as caught:
+        read_surface(tmp_path / "many.json")
+    assert caught.value.remedy.endswith(" Mesh 11, Mesh 12 and 198 more.")
+
+
 @pytest.mark.parametrize(
     ("tree", "names"),
     [

@@ -329,6 +329,18 @@ def test_pieces_are_told_with_their_areas_sizes_and_middles_the_largest_first():
             mended(points, np.arange(9).reshape(3, 3), piece=piece)
 
 
+def test_where_pieces_lie_is_told_so_that_they_are_known_apart_far_from_the_origin_too():
+    points = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 5.0, 0.0]])
+    beside = 10.0 * points + [8.0, 0.0, 0.0]
+    far = np.vstack([points, beside]) + np.array([2683456.0, 1247890.0, 408.25])
+    with pytest.raises(InputError, match="has 2 separate pieces, of 1\u202f000, 10 m²") as told:
+        mended(far, np.arange(6).reshape(2, 3))
+    assert (
+        "--piece 1 is 40 × 50 × 0 m about (2683484, 1247915, 408.2), "
+        "--piece 2 is 4 × 5 × 0 m about (2683458, 1247892.5, 408.25)"
+    ) in told.value.remedy
+
+
 def test_more_than_five_pieces_are_told_in_part():
     side = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     for count, more in ((5, False), (6, True)):

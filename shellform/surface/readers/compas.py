@@ -20,7 +20,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many
-from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined, told_apart
+from shellform.surface.readers.draft import Choice, Draft, MeshObject, first_names, joined, told_apart
 from shellform.surface.readers.network_faces import faces_in_plan
 
 _SHELL, _FORCES = "ThrustDiagram", "ForceDiagram"
@@ -61,7 +61,7 @@ def read_compas(file: Path, choice: Choice) -> Draft:
         raise InputError(
             f"holds {len(found)} {'networks' if networks else 'meshes'}",
             where=str(file),
-            remedy=f"Choose by surface.object (--object) among {', '.join(n for n, _ in found)}.",
+            remedy=f"Choose by surface.object (--object) among {first_names([n for n, _ in found])}.",
         )
     parts, openings = [], 0
     for name, table in found:

@@ -133,9 +133,13 @@ def choosable(draft: Draft) -> str:
     known = list(dict.fromkeys(each for each in draft.objects if each))
     if len(known) < 2:
         return ""
-    more = f" and {len(known) - _NAMES_TOLD} more" if len(known) > _NAMES_TOLD else ""
-    listed = ", ".join(known[:_NAMES_TOLD])
-    return f"by surface.object or surface.layer (--object, --layer), among {listed}{more}"
+    return f"by surface.object or surface.layer (--object, --layer), among {first_names(known)}"
+
+
+def first_names(names: Sequence[str]) -> str:
+    """As many names as one message has room for, and how many more there are."""
+    more = f" and {len(names) - _NAMES_TOLD} more" if len(names) > _NAMES_TOLD else ""
+    return f"{', '.join(names[:_NAMES_TOLD])}{more}"
 
 
 def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:

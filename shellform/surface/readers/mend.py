@@ -8,6 +8,7 @@ are turned alike; slivers are collapsed or flipped; of a closed skin the upper o
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from shellform import quantities
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Draft, choosable, without_unused
+from shellform.surface.readers.outliers import without_outliers
 from shellform.surface.readers.seams import sewn, without_slivers
 from shellform.surface.readers.sides import pieces_of, shared_edges, side_of
 from shellform.surface.readers.teeth import without_teeth
@@ -66,7 +68,8 @@ def mended(draft: Draft, where: str, *, face: str | None = None, piece: int | No
                 "faces were turned the same way as the others",
             ),
         )
-    return without_teeth(_parted(_open(without_slivers(draft), face, where), size))
+    draft = without_slivers(without_outliers(draft))
+    return without_teeth(_parted(_open(draft, face, where), size))
 
 
 def turned_alike(triangles: Indices, where: str) -> Indices:
@@ -194,7 +197,7 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
     order = np.argsort(-area, kind="stable")
     if piece is None:
         others = choosable(draft)
-        listed = ", ".join(f"{area[k]:.3g}" for k in order[:_PIECES_TOLD]) + (
+        listed = ", ".join(quantities.number(area[k]) for k in order[:_PIECES_TOLD]) + (
             " …" if count > _PIECES_TOLD else ""
         )
         raise InputError(
@@ -216,8 +219,13 @@ def _choices(draft: Draft, label: Indices, pieces: Indices) -> str:
     told = []
     for number, piece in enumerate(pieces.tolist(), 1):
         points = draft.points[np.unique(draft.triangles[label == piece])]
-        size = " × ".join(f"{extent:.3g}" for extent in np.ptp(points, axis=0))
-        middle = ", ".join(f"{x:.3g}" for x in 0.5 * (points.min(axis=0) + points.max(axis=0)))
+        extent = np.ptp(points, axis=0)
+        size = " × ".join(f"{each:.3g}" for each in extent)
+        # to a hundredth of its size, however far from the origin
+        places = 2 - math.floor(math.log10(extent.max()))
+        middle = ", ".join(
+            f"{round(x, places):.12g}" for x in 0.5 * (points.min(axis=0) + points.max(axis=0))
+        )
         told.append(f"--piece {number} is {size} m about ({middle})")
     return ", ".join(told)
 
