@@ -166,6 +166,24 @@ def test_of_several_pieces_one_has_to_be_chosen():
         mended(points, faces, piece=3)
 
 
+@pytest.mark.parametrize("side", [0.05, 0.2])
+def test_crumbs_of_less_than_a_thousandth_of_the_area_are_dropped_and_told(side):
+    """Two triangles beside a cap of 27 m², of 0.0025 and of 0.04 m² together."""
+    crumbs = np.array(
+        [[9.0, 0, 0], [9 + side, 0, 0], [9, side, 0], [9, 3, 1], [9 + side, 3, 1], [9, 3 + side, 1]]
+    )
+    points = np.vstack([POINTS, crumbs])
+    faces = np.vstack([TRIANGLES, len(POINTS) + np.arange(6).reshape(2, 3)])
+    if side > 0.1:
+        with pytest.raises(InputError, match=r"3 separate pieces, of 27, 0.02, 0.02 m²"):
+            mended(points, faces)
+        return
+    surface = mended(points, faces)
+    as_clean(surface)
+    told(surface, "2 loose pieces were dropped, 0.0025 m² in all")
+    assert mended(points, faces, piece=2).area == pytest.approx(0.5 * side**2)
+
+
 def test_pieces_that_touch_in_a_point_only_are_pieces():
     corner = POINTS[0] - POINTS[-1]
     points = np.vstack([POINTS, POINTS + corner])

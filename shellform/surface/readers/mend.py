@@ -30,6 +30,7 @@ _SAME = 1e-8  # of the size: vertices nearer than that are one
 _FLAT = 5e-10  # of the squared size: a surface smaller than that has no area
 _FURTHEST = 1e9  # m from the origin
 _PIECES_TOLD = 5  # the largest ones, in one message
+_LOOSE = 1e-3  # of the area: loose pieces that have less in all are crumbs of a scan
 _PARTED = 1e-6  # of the size: how far the two sides of a parted vertex move into their faces
 
 
@@ -195,6 +196,11 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
         return draft
     area = np.bincount(label, triangle_areas(draft.points, draft.triangles))
     order = np.argsort(-area, kind="stable")
+    loose = float(area[order[1:]].sum())
+    if piece is None and loose <= _LOOSE * area.sum():
+        kept = replace(draft, triangles=draft.triangles[label == order[0]])
+        told = how_many(count - 1, "loose piece was dropped", "loose pieces were dropped")
+        return noted(without_unused(kept), f"{told}, {quantities.number(loose, 2)} m² in all")
     if piece is None:
         others = choosable(draft)
         listed = ", ".join(quantities.number(area[k]) for k in order[:_PIECES_TOLD]) + (
