@@ -201,3 +201,23 @@ def test_what_can_not_be_closed_smoothly_is_refused():
         surface_of(
             Draft(points, np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])), "chimney", fill="all"
         )
+
+
+@pytest.mark.parametrize("width", [2, 3])
+def test_openings_narrower_than_a_twentieth_of_the_extent_are_told_until_they_are_filled(width):
+    """Squares are left out of a sheet of 10 m at two places, 0.4 m wide in the first case and 0.6 m in the
+    second, where 0.5 m is a twentieth."""
+    x, y = (each.ravel() for each in np.meshgrid(*2 * [np.linspace(-5.0, 5.0, 51)]))
+    points = np.column_stack([x, y, 2.0 - 0.04 * (x**2 + y**2)])
+    corner = np.arange(51 * 50).reshape(50, 51)[:, :50]
+    for row, column in ((10, 12), (30, 25)):
+        corner = np.where(np.isin(corner, corner[row : row + width, column : column + width]), -1, corner)
+    a = corner[corner >= 0]
+    faces = np.vstack([np.column_stack([a, a + 1, a + 52]), np.column_stack([a, a + 52, a + 51])])
+    surface = surface_of(Draft(points, faces), "sheet")
+    assert len(surface.boundary) == 3
+    told = [note for note in surface.mended if "2 openings are narrower" in note]
+    assert len(told) == (width == 2)
+    assert not any(
+        "narrower" in note for note in surface_of(Draft(points, faces), "sheet", fill="holes").mended
+    )

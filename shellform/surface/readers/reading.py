@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, require_file, unreadable
+from shellform.errors import InputError, how_many, require_file, unreadable
 from shellform.surface.readers import compas, compas_surfaces, foreign, plain
 from shellform.surface.readers.draft import MOST_BYTES, Choice, Draft
 from shellform.surface.readers.fills import filled
@@ -50,6 +50,11 @@ _COARSE = 1e-4  # of the extent, that coordinates lie apart: rounding bends what
 _STEPS = (
     "its coordinates are numbers of 32 bits, {:.2g} m apart so far from the origin, which creases it: export it nearer to "
     "its origin, or in a format of 64 bits (OBJ, STEP, 3DM)"
+)
+_NARROW = 0.05  # of the larger extent: openings that aren't as wide lie between two rods, as far apart as these usually are
+_NARROW_TOLD = (
+    "{} narrower than a twentieth of its extent, and an edge beam goes round each: close them where they aren't meant "
+    "(surface.fill, --fill holes, which closes all)"
 )
 _HANGS = "its highest point lies on its edge and its lowest does not: where it is drawn as it hangs, turn it over (surface.up, --up {})"
 _UPRIGHT_AS_READ = "it stands upright, with a plan of {:.0f} % of its area"
@@ -166,20 +171,26 @@ def _closed(whole: Draft, vertical: str, source: str, fill: str | None, ground: 
 
 
 def _doubts(surface: Surface, vertical: str) -> tuple[str, ...]:
-    """What tells that a surface's edge is no line that rods can end along, or that another axis of its file
-    is the vertical one, with that axis."""
-    ragged = (_RAGGED,) if any(is_ragged(surface.vertices, loop) for loop in surface.boundary) else ()
+    """What tells that a surface's edge is no line that rods can end along, that openings are hardly meant, or
+    that another axis of its file is the vertical one, with that axis."""
+    doubts = list[str]()
+    if any(is_ragged(surface.vertices, loop) for loop in surface.boundary):
+        doubts.append(_RAGGED)
+    widths = [float(np.ptp(surface.vertices[loop], axis=0).max()) for loop in surface.boundary[1:]]
+    narrow = sum(width < _NARROW * float(surface.size.max()) for width in widths)
+    if narrow:
+        doubts.append(_NARROW_TOLD.format(how_many(narrow, "opening is", "openings are")))
     plan = _plan_share(surface.vertices, surface.triangles)
     if plan >= _UPRIGHT:
-        return (*ragged, _HANGS.format(downwards(vertical))) if _hangs(surface.vertices, surface) else ragged
+        return (*doubts, *([_HANGS.format(downwards(vertical))] if _hangs(surface.vertices, surface) else []))
     told = _UPRIGHT_AS_READ.format(100.0 * plan)
     as_in_file = turned_back(surface.vertices, vertical)
     for axis in ("z", *_OTHER_AXES):
         points = turned_up(as_in_file, axis)
         if _plan_share(points, surface.triangles) >= _UPRIGHT:
             found = downwards(axis) if _hangs(points, surface) else axis
-            return (*ragged, f"{told}: give its {found} axis for the vertical (surface.up, --up {found})")
-    return (*ragged, f"{told}, and so it does with any other of its axes for the vertical")
+            return (*doubts, f"{told}: give its {found} axis for the vertical (surface.up, --up {found})")
+    return (*doubts, f"{told}, and so it does with any other of its axes for the vertical")
 
 
 def _step_of_32_bits(draft: Draft) -> float:
