@@ -260,13 +260,15 @@ def test_a_study_that_lost_some_of_its_workers_says_how_many_and_ends(tmp_path, 
         changed.setattr("shellform.study.live._SHORT", 0.5)
 
         def show(now):
-            if now.done and len(processes) == 2:
+            if now.manned.most == 2 == len(processes):  # both have been seen, and hardly a design is done
                 os.kill(processes.pop(), signal.SIGKILL)
             told.append(_line(now))
 
         found = run_study(file, tmp_path / "out", work=slow, show=show)
     assert (found.designs, found.failed) == (60, 0)
-    assert [line for line in told if ", 1 of 2 workers gone for 1 s" in line]
+    assert [
+        line for line in told if re.search(r", 1 of 2 workers gone for [1-9]\d* s", line)
+    ]  # on a busy machine for more
 
 
 def test_workers_that_come_back_are_no_longer_told_as_gone(monkeypatch):
