@@ -28,7 +28,7 @@ from shellform.surface.shape.triangles import adjacency, open_edges
 
 _FEWEST = 200  # vertices of a surface: of fewer, each is likely to be meant
 _SUSPECT = 5.0  # times the median, that a vertex is off the mean of its neighbours
-_TRIED = 0.05  # of the vertices, the most suspect: each takes half a millisecond
+_TRIED = 0.05  # of the vertices, the most suspect: each takes a millisecond or two
 _MOST_TRIED = 5000
 _FAR = 8.0  # standard deviations of the prediction
 _LEAST = 0.1  # of a side
@@ -73,7 +73,8 @@ def without_outliers(draft: Draft) -> Draft:
     rings = _Rings(graph.indptr.astype(np.int64), graph.indices.astype(np.int64))
     off = _off_neighbours(points, faces, rings)
     most = min(_MOST_TRIED, int(_TRIED * len(points)))
-    suspects = [int(k) for k in np.argsort(-off, kind="stable")[:most] if off[k] > _SUSPECT * np.median(off)]
+    first = np.argsort(-off, kind="stable")[:most]
+    suspects = first[off[first] > _SUSPECT * np.median(off)].tolist()
     along = _along_edge(faces)
     for vertex in suspects:
         place = _place(points, vertex, rings.around(vertex), along.get(vertex))
