@@ -80,6 +80,11 @@ class Meshing:
     begins: Callable[[float], None] = lambda triangles: None
 
 
+def noted(draft: Draft, note: str) -> Draft:
+    """The draft with one more note."""
+    return replace(draft, notes=(*draft.notes, note))
+
+
 def among(labels: Sequence[tuple[str, str]], choice: Choice, where: str) -> Flags:
     """Which of the objects with these (layer, name) `labels` are meant (n,). Raises InputError that lists
     what there is.

@@ -16,8 +16,7 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many
-from shellform.surface.readers.draft import Draft
-from shellform.surface.readers.mend import noted
+from shellform.surface.readers.draft import Draft, noted
 from shellform.surface.shape.plate import bent_heights
 from shellform.surface.shape.target import ON_GROUND, closed_loops, make_surface
 from shellform.surface.shape.triangles import area_vectors, open_edges

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from shellform import quantities
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many
-from shellform.surface.readers.draft import Draft, choosable, without_unused
+from shellform.surface.readers.draft import Draft, choosable, noted, without_unused
 from shellform.surface.readers.outliers import without_outliers
 from shellform.surface.readers.seams import sewn, without_slivers
 from shellform.surface.readers.sides import pieces_of, shared_edges, side_of
@@ -197,11 +197,7 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
     area = np.bincount(label, triangle_areas(draft.points, draft.triangles))
     order = np.argsort(-area, kind="stable")
     loose = float(area[order[1:]].sum())
-    if piece is None and loose <= _LOOSE * area.sum():
-        kept = replace(draft, triangles=draft.triangles[label == order[0]])
-        told = how_many(count - 1, "loose piece was dropped", "loose pieces were dropped")
-        return noted(without_unused(kept), f"{told}, {quantities.number(loose, 2)} m² in all")
-    if piece is None:
+    if piece is None and loose > _LOOSE * area.sum():
         others = choosable(draft)
         listed = ", ".join(quantities.number(area[k]) for k in order[:_PIECES_TOLD]) + (
             " …" if count > _PIECES_TOLD else ""
@@ -213,11 +209,12 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
             + (f"or {others}; " if others else "")
             + "or join their edges.",
         )
-    kept = replace(draft, triangles=draft.triangles[label == order[piece - 1]])
-    return noted(
-        without_unused(kept),
-        f"piece {piece} of {count} was taken, {quantities.number(area[order[piece - 1]])} m²",
-    )
+    taken = order[0 if piece is None else piece - 1]
+    kept = without_unused(replace(draft, triangles=draft.triangles[label == taken]))
+    if piece is not None:
+        return noted(kept, f"piece {piece} of {count} was taken, {quantities.number(area[taken])} m²")
+    told = how_many(count - 1, "loose piece was dropped", "loose pieces were dropped")
+    return noted(kept, f"{told}, {quantities.number(loose, 2)} m² in all")
 
 
 def _choices(draft: Draft, label: Indices, pieces: Indices) -> str:
@@ -299,8 +296,3 @@ def _parted(draft: Draft, size: float) -> Draft:
         "vertices at which the edge met itself were parted",
     )
     return noted(parted, f"{met}, by {quantities.number(_PARTED * size, 1)} m")
-
-
-def noted(draft: Draft, note: str) -> Draft:
-    """The draft with one more note."""
-    return replace(draft, notes=(*draft.notes, note))

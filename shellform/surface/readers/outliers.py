@@ -22,7 +22,7 @@ import numpy as np
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import how_many
 from shellform.quantities import number
-from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.draft import Draft, noted
 from shellform.surface.shape.target import rough_normals
 from shellform.surface.shape.triangles import adjacency, open_edges
 
@@ -93,7 +93,7 @@ def without_outliers(draft: Draft) -> Draft:
     if normals is not None:
         normals = normals.copy()
         normals[np.unique(np.concatenate([moved, *(rings.at(int(k)) for k in moved)]))] = 0.0
-    return replace(draft, points=points, normals=normals, notes=(*draft.notes, f"{told}, by {by} m at most"))
+    return noted(replace(draft, points=points, normals=normals), f"{told}, by {by} m at most")
 
 
 def _off_neighbours(points: Reals, faces: Indices, rings: _Rings) -> Reals:

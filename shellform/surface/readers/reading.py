@@ -16,9 +16,9 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many, require_file, unreadable
 from shellform.surface.readers import compas, compas_surfaces, foreign, plain
-from shellform.surface.readers.draft import MOST_BYTES, Choice, Draft
+from shellform.surface.readers.draft import MOST_BYTES, Choice, Draft, noted
 from shellform.surface.readers.fills import filled
-from shellform.surface.readers.mend import mended, noted
+from shellform.surface.readers.mend import mended
 from shellform.surface.readers.teeth import is_ragged
 from shellform.surface.shape.target import Surface, make_surface
 from shellform.surface.shape.triangles import area_vectors

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Indices, Reals
 from shellform.errors import how_many
 from shellform.quantities import number
-from shellform.surface.readers.draft import Draft, without_unused
+from shellform.surface.readers.draft import Draft, noted, without_unused
 from shellform.surface.shape.triangles import (
     area_vectors,
     directed_edges,
@@ -159,7 +159,7 @@ def without_slivers(draft: Draft) -> Draft:
             break
     done = [(collapsed, "collapsed"), (flipped, "flipped"), (dropped, "dropped at the edge")]
     sentences = [f"{count} {what}" for count, what in done if count]
-    return replace(draft, notes=(*draft.notes, f"slivers: {', '.join(sentences)}")) if sentences else draft
+    return noted(draft, f"slivers: {', '.join(sentences)}") if sentences else draft
 
 
 def _fewer_slivers(draft: Draft) -> tuple[Draft, tuple[int, int, int]]:

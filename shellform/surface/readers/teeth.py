@@ -26,7 +26,7 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import how_many
 from shellform.quantities import number
-from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.draft import Draft, noted
 from shellform.surface.readers.sides import pieces_of
 from shellform.surface.shape.target import across_edges, closed_loops, rough_normals
 from shellform.surface.shape.tree import Tree
@@ -116,13 +116,8 @@ def _told(draft: Draft, placed: Reals, faces: Indices, track: Tree, edges: int) 
     most = float(track.nearest(draft.points[moved | ~used])[2].max())
     told = how_many(edges, "edge was toothed and was smoothed", "edges were toothed and were smoothed")
     given = None if draft.normals is None else np.where(moved[:, None], 0.0, draft.normals)[used]
-    return replace(
-        draft,
-        points=placed[used],
-        triangles=among_used,
-        normals=given,
-        notes=(*draft.notes, f"{told}, by {number(most, 2)} m at most"),
-    )
+    smooth = replace(draft, points=placed[used], triangles=among_used, normals=given)
+    return noted(smooth, f"{told}, by {number(most, 2)} m at most")
 
 
 def _without_spikes(faces: Indices, count: int) -> Indices | None:
