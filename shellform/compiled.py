@@ -5,10 +5,10 @@ The first compilation takes seconds in which nothing else would be seen to happe
 process, unless the environment has SHELLFORM_QUIET, which processes hand on to those that they start.
 
 The cache lies beside the package, or in the user's home where the package can't be written; where neither
-can, in a temporary folder of this process and those that it starts. Processes that compile side by side take
-turns at a function's entry, each machine code has a file of its own name, and it is there before the entry
-names it: Numba's own entry could name the code that another process, or an older version of the function,
-left under the same number.
+can, in a temporary folder of this process and those that it starts. Of processes that need the same function
+one compiles it, and the others wait for what it leaves. Each machine code has a file of its own name, and it
+is there before the entry names it: Numba's own entry could name the code that another process, or an older
+version of the function, left under the same number.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba import prange, set_num_threads
 from numba.core import event
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from shellform.work_clock import Work, WorkClock, listener
 
@@ -85,18 +85,17 @@ def clock_without_compiling() -> float:
     return time.perf_counter() - _compilation.seconds
 
 
-def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """As Numba's, for functions that are kept in a cache."""
 
     def compiled(function: Callable[..., Any]) -> Any:
-        try:
-            found = numba.njit(**options)(function)
-        except RuntimeError:  # no place for the cache
-            _cache_for_now()
-            found = numba.njit(**options)(function)
-        if options.get("cache"):
-            own = found._cache
-            own._cache_file = _Entry(own.cache_path, own._impl.filename_base, own._cache_file._source_stamp)
+        found = numba.njit(**options)(function)
+        if cache:
+            try:
+                found._cache = _Cache(function)
+            except RuntimeError:  # no place for it
+                _cache_for_now()
+                found._cache = _Cache(function)
         return found
 
     return compiled
@@ -107,33 +106,69 @@ def is_kept(function: Any) -> bool:
     return bool(function._cache._cache_file._load_index())
 
 
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """What is kept of one function. Who finds no machine code there has a turn at it, until that is saved:
+    another process that comes for it waits. A process that ends leaves its turn."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _Entry(self.cache_path, self._impl.filename_base, stamp)
+        self._turn: int | None = None
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The machine code for a signature; None where it is to be compiled by this process."""
+        found = super().load_overload(sig, target_context)
+        if found is None and self._turn is None:
+            self._impl.locator.ensure_cache_path()
+            self._turn = _turn(f"{self._cache_file._index_path}.lock")
+            found = super().load_overload(sig, target_context)
+            if found is not None:
+                self._leave()
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Takes machine code up, and ends the turn."""
+        try:
+            super().save_overload(sig, data)
+        finally:
+            self._leave()
+
+    def _leave(self) -> None:
+        if self._turn is not None:
+            os.close(self._turn)
+            self._turn = None
+
+
 class _Entry(IndexDataCacheFile):  # type: ignore[misc]
-    """What the cache holds of one function: an index of signatures, and a file of machine code for each."""
+    """An index of signatures, and a file of machine code for each."""
 
     def save(self, key: Any, data: Any) -> None:
-        """Takes machine code up."""
-        with self._alone():
-            known = self._load_index()
-            if not known:  # what there is belongs to an older version of the function
-                for file in Path(self._cache_path).glob(
-                    self._data_name_pattern.format(number=0)[:-5] + "*.nbc"
-                ):
-                    with contextlib.suppress(OSError):
-                        file.unlink()
-            known[key] = self._data_name(secrets.randbits(60))
-            self._save_data(known[key], data)
-            self._save_index(known)
+        """Takes machine code up; one process at a time."""
+        known = self._load_index()
+        if not known:  # what there is belongs to an older version of the function
+            for file in Path(self._cache_path).glob(self._data_name_pattern.format(number=0)[:-5] + "*.nbc"):
+                with contextlib.suppress(OSError):
+                    file.unlink()
+        known[key] = self._data_name(secrets.randbits(60))
+        self._save_data(known[key], data)
+        self._save_index(known)
 
-    @contextlib.contextmanager
-    def _alone(self) -> Iterator[None]:
-        try:
-            import fcntl
-        except ImportError:  # no such locks on Windows: an entry may get lost there, and is compiled again
-            yield
-            return
-        with open(f"{self._index_path}.lock", "wb") as held:
-            fcntl.flock(held, fcntl.LOCK_EX)
-            yield
+
+def _turn(path: str) -> int:
+    """The descriptor of a lock, until it is closed. What is waited for it counts as compiling."""
+    held = os.open(path, os.O_CREAT | os.O_WRONLY, 0o666)
+    try:
+        import fcntl
+    except ImportError:  # no such locks on Windows: an entry may get lost there, and is compiled again
+        return held
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        _compilation.on_start(None)
+        fcntl.flock(held, fcntl.LOCK_EX)
+        _compilation.on_end(None)
+    return held
 
 
 def _cache_for_now() -> None:

@@ -64,37 +64,41 @@ print(kept(np.ones(1, kind)).dtype, flush=True)
 """
 
 
-def test_processes_that_compile_side_by_side_lose_no_entry_and_take_no_other_s_code(tmp_path):
+def test_of_processes_side_by_side_one_compiles_a_loop_none_loses_an_entry_and_none_takes_another_s_code(
+    tmp_path,
+):
     (tmp_path / "loop.py").write_text("def twice(x):\n    return x + x\n", encoding="utf-8")
     variables = {
         **os.environ,
         "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "NUMBA_DEBUG_CACHE": "1",
         "PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}",
-        "SHELLFORM_QUIET": "1",
     }
     kinds = ["float32", "float64", "int64", "complex64"]
     jobs = [
         subprocess.Popen(
             [sys.executable, "-c", SIDE_BY_SIDE, kind], env=variables, text=True,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )
-        for kind in kinds
+        for kind in 2 * kinds
     ]  # fmt: skip
     for job in jobs:
         assert job.stdout.readline() == "ready\n"
     for job in jobs:
         job.stdin.write("go\n")
         job.stdin.flush()
-    assert [job.communicate()[0].strip() for job in jobs] == kinds
+    told = [job.communicate() for job in jobs]
+    assert [text.splitlines()[-1] for text, _ in told] == 2 * kinds
+    saved = [text.count("data saved") for text, _ in told]
+    assert [one + other for one, other in zip(saved[:4], saved[4:], strict=True)] == [1, 1, 1, 1]
     assert len(list((tmp_path / "cache").rglob("*.nbc"))) == len(kinds)
-    told = [
-        subprocess.run(
-            [sys.executable, "-c", SIDE_BY_SIDE, kind], env={**variables, "NUMBA_DEBUG_CACHE": "1"}, input="go\n",
+    announced = [text.count("compiling its loops") for _, text in told]
+    assert announced.count(1) >= len(kinds), "who waits may be told too"
+    for kind in kinds:
+        text = subprocess.run(
+            [sys.executable, "-c", SIDE_BY_SIDE, kind], env=variables, input="go\n",
             capture_output=True, text=True, check=True,
-        ).stdout
-        for kind in kinds
-    ]  # fmt: skip
-    for text in told:
+        ).stdout  # fmt: skip
         assert "data loaded" in text
         assert "data saved" not in text
 
