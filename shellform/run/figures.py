@@ -293,12 +293,9 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard
         shown = [row for name, row in zip(names, rows, strict=True) if name in _compared(run) or asked.design]
         stem = "deviations" if asked.quantity == "deviation" else "all"
         page = figures / f"{_stem(asked, stem)}{asked.endings[0]}"
-        render.sheet(
-            page,
-            shown,
-            replace(look, size=_half(look.size if asked.paper else asked.size)),
-            heading=run.case.title,
-        )
+        across, upward = look.size
+        part = (across // len(loads), upward // len(loads)) if asked.paper else _half(asked.size)
+        render.sheet(page, shown, replace(look, size=part), heading=run.case.title)
         files.append(page)
     return files
 

@@ -8,7 +8,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.output.exchange import vtp
-from shellform.output.pictures import plots, render
+from shellform.output.pictures import plots, render, sheets
 from shellform.output.pictures.legend import key, key_height
 from shellform.output.pictures.panel import Look, Panel, scale_of
 
@@ -41,19 +41,47 @@ def test_the_same_panel_gives_the_same_picture_and_another_deviation_another(pan
 @pytest.mark.parametrize("size", [(480, 300), (1600, 900), (600, 1400)])
 @pytest.mark.parametrize("letters", [0.0, 60.0])
 def test_the_words_of_a_key_stand_clear_of_its_bars_and_within_its_height(panel, size, letters):
-    scale = scale_of([panel], Look(letters=letters, dots=72), size)
-    words, bars = key(scale, size[0], key_height(size))
+    look = Look(size=size, letters=letters, dots=72)
+    height = key_height(look)
+    words, bars = key(scale_of([panel], look, size), size[0], height)
     assert len(bars) == 2
     for word in words:
         foot, top = word.at[1], word.at[1] + word.pixels
         assert foot >= 0.0
-        assert top <= key_height(size)
+        assert top <= height
         for bar in bars:
             assert top <= bar.low or foot >= bar.high, (word, bar)
     assert {word.text for word in words if word.at[1] > bars[0].high} == {
         "deviation from the target",
         "cable force (pale: slack)",
     }
+
+
+@pytest.mark.parametrize("letters", [5.0, 9.0, 14.0])
+def test_letters_that_are_given_keep_their_height_however_long_the_words_and_titles_hide_no_picture(
+    panel, letters
+):
+    look = Look(size=(360, 260), letters=letters, dots=72)
+    long = replace(panel, title="a cap of a title that is longer than what stands below it is wide")
+    page = sheets.table([[panel, long]], look, heading="what is above it, and is broken as well " * 2)
+    first, second, above, key_of = page.drawings
+    for drawing in (above, first, second):
+        for word in drawing.words:
+            assert word.pixels in (round(0.9 * letters), round(letters), round(1.25 * letters))
+            assert 0.0 <= word.at[1] <= drawing.size[1] - word.pixels
+            assert word.at[0] + 0.6 * word.pixels * len(word.text) <= drawing.size[0]
+    assert " ".join(word.text for word in second.words).startswith(long.title)
+    assert {word.pixels for word in key_of.words} == {round(0.9 * letters)}
+    points = page.camera.seen(panel.positions)[:, 1] / page.camera.height + 0.5
+    assert points.max() * first.size[1] < min(word.at[1] for word in second.words)
+
+
+def test_letters_that_leave_no_room_for_the_picture_are_refused_and_smaller_ones_taken(panel):
+    look = Look(size=(160, 120), letters=14.0, dots=72)
+    with pytest.raises(InputError, match="too small for its letters") as refused:
+        sheets.single([panel], look)
+    assert "--font-size" in refused.value.remedy
+    sheets.single([panel], replace(look, letters=5.0))
 
 
 def test_a_cable_that_pulls_beyond_the_scale_is_drawn_as_one_at_its_end(tmp_path, panel):

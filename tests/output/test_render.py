@@ -66,7 +66,7 @@ def bare(**changes):
 
 def above(picture):
     """The part of a picture between title and colour bar."""
-    return picture[45 : SIZE[1] - legend.key_height(SIZE)].astype(int)
+    return picture[45 : SIZE[1] - legend.key_height(SMALL)].astype(int)
 
 
 def ink(picture, axis=None):
@@ -185,7 +185,7 @@ def test_a_sheet_has_the_size_of_its_panels_and_one_scale_and_camera(tmp_path):
     )
     render.sheet(tmp_path / "sheet.png", [[good, bad], [good]], SMALL)
     page = np.flipud(pv.read(tmp_path / "sheet.png").point_data.active_scalars.reshape(-1, 800, 3))
-    assert page.shape == (600 + legend.key_height(SIZE), 800, 3)
+    assert page.shape == (600 + legend.key_height(SMALL), 800, 3)
     upper, lower = page[45:300, :400].astype(int), page[345:600, :400].astype(int)
     assert ink(upper) > 500
     assert np.abs(upper - lower).max() <= 1
@@ -355,7 +355,7 @@ def test_drawing_without_a_display_says_nothing_on_standard_error():
 def test_cables_have_a_scale_of_their_own_with_a_key_only_where_one_is_taut():
     none = replace(panel(), cable_forces=np.zeros(64))
     taut, slack = (
-        render.image(each, SMALL)[-legend.key_height(SIZE) :].astype(int) for each in (panel(), none)
+        render.image(each, SMALL)[-legend.key_height(SMALL) :].astype(int) for each in (panel(), none)
     )
     brick = legend.cable_colours(np.array([0.999]))[0]
     assert (np.abs(taut - brick).max(axis=2) < 4).sum() > 5
@@ -369,7 +369,7 @@ def test_large_forces_are_told_in_kilonewtons_and_rounding_as_nothing():
     scale = scale_of([strong], SMALL, SIZE)
     told = legend.title(strong, scale, SIZE)[1].text
     assert told == "deviation: maximum 0 mm, mean 0 mm; 64 cables, 12 kN at most"
-    assert "12 kN" in [word.text for word in legend.key(scale, SIZE[0], legend.key_height(SIZE))[0]]
+    assert "12 kN" in [word.text for word in legend.key(scale, SIZE[0], legend.key_height(SMALL))[0]]
     assert legend.title(panel(), scale_of([panel()], SMALL, SIZE), SIZE)[1].text.endswith(
         "64 cables, 12 N at most"
     )
@@ -396,7 +396,7 @@ def test_a_number_of_the_key_lies_within_a_hundredth_of_the_scale_from_its_tick(
     strong = replace(panel(), cable_forces=force / panel().cable_forces.max() * panel().cable_forces)
     words = [
         word
-        for word in legend.key(scale_of([strong], SMALL, SIZE), SIZE[0], legend.key_height(SIZE))[0]
+        for word in legend.key(scale_of([strong], SMALL, SIZE), SIZE[0], legend.key_height(SMALL))[0]
         if word.at[0] > 0.6 * SIZE[0]
     ]
     ticks = [
@@ -413,7 +413,7 @@ def test_a_value_beyond_the_scale_is_told_at_its_end_and_long_titles_shrink():
         legend.key(
             scale_of([bare(deviation=np.full(len(panel().positions), far))], SMALL, SIZE),
             400,
-            legend.key_height(SIZE),
+            legend.key_height(SMALL),
         )[0]
         for far in (0.01, 0.02)
     )

@@ -96,6 +96,23 @@ def test_histories_are_drawn_from_the_run_s_file_as_wide_as_asked_and_missed_whe
     (run.folder / "history.csv").unlink()
 
 
+def test_a_sheet_in_print_is_as_wide_as_asked_for_and_all_its_letters_are_as_high_as_in_one_picture(
+    run, tmp_path
+):
+    asked = wish(**{**NOTHING, "kind": "svg"}, width_mm=180.0, font_size=8.0, folder=tmp_path)
+    *_, one, sheet = (file.read_text(encoding="utf-8") for file in draw_designs(run, asked))
+    heights = {}
+    for text in (one, sheet):
+        wide = float(re.search(r'width="([\d.]+)pt"', text)[1])
+        assert 25.4 / 72.0 * wide == pytest.approx(180.0, abs=0.5)
+        heights[text] = {float(each) for each in re.findall(r"font(?:-size)?:[^;]*?([\d.]+)px", text)}
+    assert min(heights[one]) == pytest.approx(0.9 * 8.0, abs=0.2)
+    assert min(heights[sheet]) == min(heights[one])
+    words = " ".join(re.findall(r">([^<>]+)</text>", sheet))
+    largest = 1e3 * deviations(run.shell_of("initial"), run.states["initial"]["design"]).max()
+    assert f"initial design, design load deviation: maximum {largest:.1f} mm" in words, "broken, not lost"
+
+
 def test_a_net_s_springs_are_drawn_as_wide_and_up_to_what_is_asked(run, tmp_path):
     asked = wish(
         **{**NOTHING, "quantity": "spring", "kind": "svg", "limit": 5.0}, width_mm=85.0, folder=tmp_path

@@ -8,6 +8,9 @@ dark on a line through CIELAB.
 
 from __future__ import annotations
 
+import math
+import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +20,7 @@ from numpy.typing import NDArray
 from shellform.arrays import Reals, Record
 from shellform.errors import how_many
 from shellform.output.pictures.colours import VIRIDIS
-from shellform.output.pictures.panel import Panel, Scale
+from shellform.output.pictures.panel import Look, Panel, Scale
 from shellform.quantities import number
 
 Colours = NDArray[np.uint8]
@@ -38,6 +41,10 @@ _NOTHING = 1e-6  # of the scale: what is smaller is rounding
 _TRUE = 0.01  # of the scale: how far a tick may lie from its number
 _STEPS = 4  # of a bar
 _CAPTION = 3.2  # of a line: where the words over a bar stand
+_SMALLER = 0.9  # of a title's letters, those of what stands below it, and of the key
+_LINE = 1.4  # letters' heights from one line of a title to the next
+_ABOVE, _BELOW = 1.7, 0.5  # the same, from the panel's edge to the first one's foot, and below the last one's
+TWO_LINES = _ABOVE + _LINE + _BELOW
 _WIDE = 0.6  # mean width of a letter over its height, generous
 
 
@@ -97,29 +104,30 @@ def title(panel: Panel, scale: Scale, size: tuple[int, int]) -> tuple[Word, ...]
         label, size_of = _newtons(scale.force)
         caption += f", {number(float(panel.cable_forces.max()) / size_of)} {label} at most"
     line = scale.letters
-    return (
-        Word(
-            panel.title,
-            (0.8 * line, size[1] - 1.7 * line),
-            _fitting(panel.title, line, size[0] - 1.6 * line),
-            bold=True,
-        ),
-        Word(
-            caption,
-            (0.8 * line, size[1] - 3.1 * line),
-            _fitting(caption, round(0.9 * line), size[0] - 1.6 * line),
-            QUIET,
-        ),
-    )
+    words: list[Word] = []
+    for text, letters, colour in ((panel.title, line, INK), (caption, round(_SMALLER * line), QUIET)):
+        for part, pixels in _lines(text, letters, size[0] - 1.6 * line, scale.given):
+            foot = size[1] - (_ABOVE + _LINE * len(words)) * line
+            words.append(Word(part, (0.8 * line, foot), pixels, colour, bold=colour == INK))
+    return tuple(words)
 
 
-def heading(text: str, size: tuple[int, int], letters: int) -> tuple[Word, ...]:
-    """The line above a sheet."""
-    return (
-        Word(
-            text, (0.8 * letters, 0.4 * size[1]), _fitting(text, letters, size[0] - 1.6 * letters), bold=True
-        ),
-    )
+def title_height(panels: Sequence[Panel], scale: Scale, width: int) -> float:
+    """Pixels that the titles of panels so wide take at most."""
+    most = max(len(title(panel, scale, (width, 0))) for panel in panels)
+    return (_ABOVE + _LINE * (most - 1) + _BELOW) * scale.letters
+
+
+def heading(text: str, width: int, scale: Scale) -> tuple[tuple[Word, ...], int]:
+    """What stands above a sheet, and the pixels that it takes."""
+    letters = round(1.25 * scale.letters)
+    lines = _lines(text, letters, width - 1.6 * letters, scale.given)
+    height = round(2.6 * scale.letters + _LINE * (len(lines) - 1) * letters)
+    foot = 1.04 * scale.letters  # of the last line
+    return tuple(
+        Word(part, (0.8 * letters, foot + _LINE * (len(lines) - 1 - k) * letters), pixels, bold=True)
+        for k, (part, pixels) in enumerate(lines)
+    ), height
 
 
 def key(scale: Scale, width: int, height: int) -> tuple[tuple[Word, ...], tuple[Ramp, ...]]:
@@ -127,7 +135,7 @@ def key(scale: Scale, width: int, height: int) -> tuple[tuple[Word, ...], tuple[
     letters that fit into so many pixels.
     """
     ends = [(0.1, 0.52), (0.66, 0.92)] if scale.force > 0.0 else [(0.22, 0.78)]
-    line = min(round(0.9 * scale.letters), round(width / 38), int(height / (_CAPTION + 1.0)))
+    line = min(round(_SMALLER * scale.letters), round(width / 38), int(height / (_CAPTION + 1.0)))
     name, unit = scale.unit
     words, ramp = _bar(
         scale.quantity,
@@ -148,9 +156,10 @@ def key(scale: Scale, width: int, height: int) -> tuple[tuple[Word, ...], tuple[
     return tuple(words), tuple(ramps)
 
 
-def key_height(size: tuple[int, int]) -> int:
-    """Pixels that the key takes below panels of a size."""
-    return round(0.17 * min(size[1], 0.7 * size[0]))
+def key_height(look: Look) -> int:
+    """Pixels that the key takes below panels of the look's size."""
+    usual = round(0.17 * min(look.size[1], 0.7 * look.size[0]))
+    return max(usual, math.ceil((_CAPTION + 1.0) * round(_SMALLER * look.pixels)))
 
 
 def _bar(
@@ -179,6 +188,14 @@ def _newtons(force: float) -> tuple[str, float]:
 def _between(table: Reals, share: Reals) -> Colours:
     at = np.linspace(0.0, 1.0, len(table))
     return np.column_stack([np.interp(share, at, table[:, k]) for k in range(3)]).round().astype(np.uint8)
+
+
+def _lines(text: str, pixels: int, room: float, given: bool) -> list[tuple[str, int]]:
+    """A text in as many lines as it takes with letters that are given, else in one; each with its letters."""
+    if not given:
+        return [(text, _fitting(text, pixels, room))]
+    columns = max(int(room / (_WIDE * pixels)), 1)
+    return [(part, pixels) for part in textwrap.wrap(text, columns)]
 
 
 def _fitting(text: str, pixels: int, room: float) -> int:

@@ -152,6 +152,11 @@ class Look:
         if self.frame is not None:
             object.__setattr__(self, "frame", reals("frame", self.frame, (None, 3)))
 
+    @property
+    def pixels(self) -> int:
+        """The height of the letters that are asked for; 0 where they fit the picture."""
+        return round(self.letters * self.dots / 72.0)
+
 
 @dataclass(frozen=True)
 class Paper:
@@ -181,6 +186,7 @@ class Scale:
     slack: bool  # whether any cable is
     reach: float  # m, the largest extent, which loads are drawn by
     letters: int  # pixels
+    given: bool  # whether they are to be that high, however long the words
     quantity: str  # what the colours measure
     unit: tuple[str, float]
 
@@ -191,7 +197,6 @@ def scale_of(panels: Sequence[Panel], look: Look, size: tuple[int, int]) -> Scal
     force = look.force or max(float(panel.cable_forces.max(initial=0.0)) for panel in panels)
     slack = any((panel.cable_forces <= 0.0).any() for panel in panels)
     usual = max(11, round(0.034 * min(size[1], 0.7 * size[0])))
-    letters = round(look.letters * look.dots / 72.0) or usual
     beyond = any(panel.deviation.max() > look.limit * (1.0 + 1e-9) for panel in panels)
     return Scale(
         limit=look.limit,
@@ -199,7 +204,8 @@ def scale_of(panels: Sequence[Panel], look: Look, size: tuple[int, int]) -> Scal
         force=max(force, 0.0),
         slack=slack,
         reach=reach,
-        letters=letters,
+        letters=look.pixels or usual,
+        given=look.pixels > 0,
         quantity=panels[0].quantity,
         unit=panels[0].unit,
     )

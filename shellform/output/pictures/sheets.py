@@ -45,7 +45,7 @@ def single(panels: Sequence[Panel], look: Look) -> list[Canvas]:
     if not panels:
         raise InputError("has no panels", where="picture", remedy="Give at least one.")
     width, height = look.size
-    strip = legend.key_height(look.size)
+    strip = legend.key_height(look)
     room = (width, height - strip)
     scale = scale_of(panels, look, room)
     camera = fitted(panels, look, scale, room)
@@ -64,27 +64,25 @@ def single(panels: Sequence[Panel], look: Look) -> list[Canvas]:
 
 
 def table(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> Canvas:
-    """All panels on one page, each of the look's size; rows may differ in length."""
+    """All panels on one page, each of the look's size, and higher by what titles of more than two lines take;
+    rows may differ in length."""
     panels = [panel for row in rows for panel in row]
     if not panels:
         raise InputError("has no panels", where="sheet", remedy="Give at least one row with one panel.")
-    width, height = look.size
     scale = scale_of(panels, look, look.size)
-    camera = fitted(panels, look, scale, look.size)
-    columns, strip = max(len(row) for row in rows), legend.key_height(look.size)
-    top = round(2.6 * scale.letters) if heading else 0
+    more = legend.title_height(panels, scale, look.size[0]) - legend.TWO_LINES * scale.letters
+    size = width, height = look.size[0], look.size[1] + max(round(more), 0)
+    camera = fitted(panels, look, scale, size)
+    columns, strip = max(len(row) for row in rows), legend.key_height(look)
+    across = width * columns
+    above, top = legend.heading(heading, across, scale) if heading else ((), 0)
     drawings = [
-        Drawing(look.size, (j * width, top + i * height), legend.title(panel, scale, look.size), (), panel)
+        Drawing(size, (j * width, top + i * height), legend.title(panel, scale, size), (), panel)
         for i, row in enumerate(rows)
         for j, panel in enumerate(row)
     ]
-    across = width * columns
     if heading:
-        drawings.append(
-            Drawing(
-                (across, top), (0, 0), legend.heading(heading, (across, top), round(1.25 * scale.letters))
-            )
-        )
+        drawings.append(Drawing((across, top), (0, 0), above))
     wide = min(across, 2 * width)
     words, ramps = legend.key(scale, wide, strip)
     drawings.append(Drawing((wide, strip), ((across - wide) // 2, top + height * len(rows)), words, ramps))

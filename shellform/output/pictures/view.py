@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Reals, Record
+from shellform.errors import InputError
+from shellform.output.pictures.legend import title_height
 from shellform.output.pictures.panel import Look, Panel, Scale, arrow_length
 
 # Directions from the shell to the eye, and which way is up.
@@ -26,7 +28,7 @@ _OBLIQUE = (1.0, -1.6, 1.1)  # with the long axis along x
 _ROUND = 0.05
 _CLEARER = 1.02  # a later quarter must spread the nodes that much wider to be preferred
 _MARGIN = 0.04  # of the panel, around everything
-_TITLE = 3.6  # letters' heights
+_MOST = 0.7  # of the panel, that titles may take
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +59,14 @@ def fitted(panels: Sequence[Panel], look: Look, scale: Scale, size: tuple[int, i
     right = np.cross(up, away)
     seen = points @ np.column_stack([right, up, away])
     low, high = seen.min(axis=0), seen.max(axis=0)
-    title = _TITLE * scale.letters / size[1]
+    title = title_height(panels, scale, size[0]) / size[1]
+    if title > _MOST:
+        raise InputError(
+            "is too small for its letters",
+            where="size",
+            value=size,
+            remedy="Give smaller letters (--font-size) or a larger picture (--width-mm).",
+        )
     across = max(high[0] - low[0], 1e-6 * scale.reach) / (1.0 - 2.0 * _MARGIN)
     upward = max(high[1] - low[1], 1e-6 * scale.reach) / (1.0 - title - 2.0 * _MARGIN)
     height = max(upward, across * size[1] / size[0])
