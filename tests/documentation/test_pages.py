@@ -9,6 +9,7 @@ instead of minutes, `design` gets small settings, and a study of 200 designs is 
 
 import ast
 import importlib
+import itertools
 import json
 import re
 import shlex
@@ -214,6 +215,15 @@ def test_every_column_of_a_table_has_a_name_that_can_be_read_aloud():
         heads = re.findall(r"^\|(.*)\|\n\|[ :|-]+\|$", page.read_text(encoding="utf-8"), re.MULTILINE)
         for head in heads:
             assert all(name.strip() for name in head.split("|")), f"{page.name}: {head}"
+
+
+def test_no_heading_skips_a_level_for_readers_who_go_from_one_to_the_next():
+    for page in sorted(PAGES.rglob("*.md")):
+        text = BLOCK.sub("", page.read_text(encoding="utf-8"))
+        levels = [len(each) for each in re.findall(r"^(#+) ", text, re.MULTILINE)]
+        assert levels[0] == 1, page
+        for before, after in itertools.pairwise(levels):
+            assert after <= before + 1, (page, levels)
 
 
 def test_every_page_stands_in_the_site_s_contents():
