@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from dataclasses import is_dataclass
+from dataclasses import is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -133,6 +133,13 @@ def test_columns_are_told_in_units_that_a_designer_uses():
         assert f'select name="{name}"' in page
     assert number_text(14400.0) == "14\u202f400", "not 1.44e+04"
     assert (number_text(None), number_text(math.nan), number_text(12)) == ("–", "–", "12")
+    stands = summary_measure("designs.best.loads.design.stands.standing").words
+    assert stands == "of these, structures that stand under the design load of the design to build"
+    planned, built = (
+        summary_measure(f"designs.best.loads.design.{way}deviation_max") for way in ("", "built_shape.")
+    )
+    assert planned.words.startswith("largest distance from the target under")
+    assert built == replace(planned, words=planned.words.replace("target", "target as built"))
     unknown = summary_measure("net.something_new")
     assert (unknown.words, unknown.unit, unknown.factor) == ("net.something_new", "", 1.0)
 

@@ -40,6 +40,15 @@ _FOUND = {
     "cables_slack": Measure("number of slack cables"),
     "rod_radius": Measure("radius of the rods", *_MM),
     "critical_factor": Measure("factor of the load at which stability ends"),
+    "critical_factor_halved": Measure("factor at which stability ends with rod elements halved"),
+    "critical_factor_error": Measure("what the mesh costs of the factor at which stability ends"),
+    "expected_stiffness": Measure("stiffness of the softest mode as built", "N/m"),
+    "drawn": Measure("structures drawn as built"),
+    "standing": Measure("of these, structures that stand"),
+    "lowest": Measure("factor of the load that the weakest of these bears"),
+    "snapped": Measure("of these, structures that stand after a snap"),
+    "snap": Measure("farthest snap of those that stand", *_MM),
+    "deviation_max_worst": Measure("largest distance from the target in the worst structure", *_MM),
     "objective": Measure("objective"),
     "objective_end": Measure("objective at the end"),
     "rods": Measure("number of rods"),
@@ -74,9 +83,11 @@ _ENTRIES = {
     "cable.force_max": Measure("largest allowed cable force", "N"),
     "cable.rest_ratio": Measure("rest length of the cables over their first length"),
     "load.force": Measure("load on a crossing", "N"),
+    "load.thickness": Measure("thickness of the concrete", *_MM),
     "load.additional": Measure("factor of the additional load"),
     "optimise.misfit": Measure("weight of the misfit"),
     "optimise.cable_force": Measure("weight of the cable forces"),
+    "optimise.built_misfit": Measure("weight of the misfit as built"),
     "optimise.rod_radius": Measure("weight of the rod radius"),
     "optimise.misfit_rms_additional": Measure("allowed misfit under the additional load", *_MM),
 }
@@ -96,7 +107,8 @@ def summary_measure(path: str) -> Measure:
         else f" of the {'design to build' if design == 'best' else design_title(design).lower() + ' design'}"
     )
     under = "" if load is None else f" under {load_title(load)}"
-    return Measure(f"{known.words}{under}{of}", known.unit, known.factor)
+    built = " as built" if way[-1:] == ["built_shape"] else ""
+    return Measure(f"{known.words}{built}{under}{of}", known.unit, known.factor)
 
 
 def entry_measure(entry: str) -> Measure:
