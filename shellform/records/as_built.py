@@ -152,15 +152,33 @@ def critical_checks(
     ]
 
 
+def keeps_factor(row: LoadRecord, least: float) -> bool | None:
+    """Whether a load's path stays stable up to the `least` factor, with rod elements halved too; None where
+    that isn't known."""
+    lower = _lower_factor(row)
+    if lower is None:
+        return None
+    if lower < least * (1.0 - EQUAL):
+        return False
+    return None if row.critical_factor_halved is None else True
+
+
+def _lower_factor(row: LoadRecord) -> float | None:
+    """The smaller critical factor of the design's mesh and of that with rod elements halved, as far as they
+    are known."""
+    coarse, fine = row.critical_factor, row.critical_factor_halved
+    return coarse if coarse is None or fine is None else min(coarse, fine)
+
+
 def _stays(design: DesignRecord, load: str, least: float, rods: RodsOf) -> Cell:
     row = design.loads.get(load)
     if row is None or row.critical_factor is None or row.critical_kind is None:
         return UNKNOWN
-    coarse, fine = row.critical_factor, row.critical_factor_halved
-    words = critical_words(coarse, row.critical_kind)
-    lower = coarse if fine is None else min(coarse, fine)
+    fine, kept = row.critical_factor_halved, keeps_factor(row, least)
+    words = critical_words(row.critical_factor, row.critical_kind)
     if fine is not None and row.critical_kind != "none":
         words += f", {fine:.3f} × with rod elements halved"
-    if lower < least * (1.0 - EQUAL):
+    if kept is False:
+        lower = _lower_factor(row) or 0.0
         return Cell(words, False, remedy=rods.stronger(least / lower if lower > 0.0 else math.inf))
-    return Cell(words, None if fine is None else True)
+    return Cell(words, kept)

@@ -201,8 +201,9 @@ class LoadRecord:
 class DesignRecord:
     """A design: how many `cables`, its `rod_radius`, m, their tensions under the design load
     (`cable_force_sum`, `cable_force_max`, N), and its `loads` by name. Of a rounded one the `section`,
-    whether it is `feasible`, `why_not`, and its `objective`; where a critical factor was asked for,
-    `critical_factor_kept`; of one to build the `ways_up`, as they were tried."""
+    whether it is `feasible`, `why_not`, and its `objective`; where a critical factor was asked for, whether
+    it is kept, with rod elements halved too (`critical_factor_kept`); of one to build the `ways_up`, as they
+    were tried."""
 
     cables: int
     rod_radius: float

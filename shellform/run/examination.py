@@ -21,7 +21,7 @@ from shellform.case.build_safety import case_tolerances, critical_factors_asked
 from shellform.case.case import Case
 from shellform.case.entries import StockRodEntry
 from shellform.errors import NotConverged
-from shellform.records.as_built import EQUAL, falls
+from shellform.records.as_built import falls, keeps_factor
 from shellform.records.checks import BUILT
 from shellform.records.drawn import DrawnPath
 from shellform.records.failures import FailureRecord, RareRecord
@@ -156,11 +156,7 @@ def _critical(case: Case, each: Examined, record: DesignRecord) -> DesignRecord:
     for largest, shares in paths(each.loads).items():
         followed = "design" if "design" in shares else largest
         rows |= _with_ends({name: rows[name] for name in shares}, each, followed, shares, asked)
-    kept = all(
-        (rows[name].critical_factor or 0.0) >= least * (1.0 - EQUAL)
-        for name, least in asked.items()
-        if name in rows
-    )
+    kept = all(keeps_factor(rows[name], least) for name, least in asked.items() if name in rows)
     return replace(record, loads=rows, critical_factor_kept=kept if asked else None)
 
 

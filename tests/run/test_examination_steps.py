@@ -142,25 +142,30 @@ def test_a_path_that_is_lost_is_told_of_every_load_on_it(monkeypatch):
         ({"design": 1.3}, True),
         ({"design": 1.3013}, True),  # to a thousandth
         ({"design": 1.3014}, False),
-        ({"design": 1.2, "wind": 2.1}, False),
+        ({"design": 1.2, "wind": 2.2}, False),
         ({"wind": 2.0, "storm": 9.0}, True),  # of loads that the design has
         ({"none": 1.0}, False),  # for which nothing was found
+        ({"wind": 2.05}, False),  # kept by the coarser mesh alone
     ],
 )
-def test_critical_factors_are_kept_where_every_one_that_is_asked_for_is(monkeypatch, asked, kept):
+def test_critical_factors_are_kept_where_every_one_that_is_asked_for_is_with_rod_elements_halved_too(
+    monkeypatch, asked, kept
+):
     seen = []
 
     def with_ends(rows, each, followed, shares, wanted):
         seen.append((followed, sorted(shares)))
-        factor = 1.3 if followed == "design" else 2.0
-        return {name: replace(rows[name], critical_factor=factor) for name in shares}
+        coarse, fine = (1.4, 1.3) if followed == "design" else (2.1, 2.0)
+        return {
+            name: replace(rows[name], critical_factor=coarse, critical_factor_halved=fine) for name in shares
+        }
 
     monkeypatch.setattr(examination, "critical_factors_asked", lambda case: asked)
     monkeypatch.setattr(examination, "_with_ends", with_ends)
     record = examination._critical(CASE, examined(), told().designs["initial"])
     assert seen == [("design", ["additional", "design"]), ("wind", ["wind"])], "by the design load, if it can"
     assert record.critical_factor_kept is kept
-    assert record.loads["wind"].critical_factor == 2.0
+    assert record.loads["wind"].critical_factor == 2.1
     assert record.loads["none"].critical_factor is None
 
 
