@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -45,6 +46,7 @@ class Examined(Record):
         """Of all that its drawn structures depend on."""
         network = self.shell.network(self.design)
         digest = hashlib.sha256(f"{shellform.__version__} {seed} {asdict(self.tolerances)}".encode())
+        digest.update(" ".join(map(json.dumps, self.loads)).encode())  # by which paths are kept
         for array in (
             self.shell.target.positions,
             network.beams.axial,
@@ -62,10 +64,11 @@ class Examined(Record):
 
 
 class Clock:
-    """How long is left of so many structures `planned` at the most, by those that were drawn so far."""
+    """How long is left of so many structures `planned` at the most, by those that were drawn so far, and of
+    what comes `afterwards`, which takes as long as so many structures."""
 
-    def __init__(self, planned: int) -> None:
-        self.planned, self.done, self.spent = planned, 0, 0.0
+    def __init__(self, planned: int, afterwards: int = 0) -> None:
+        self.planned, self.afterwards, self.done, self.spent = planned, afterwards, 0, 0.0
 
     def kept(self, count: int) -> None:
         """So many were drawn before."""
@@ -78,11 +81,11 @@ class Clock:
 
     def left(self) -> float:
         """Seconds."""
-        return self.spent / max(self.done, 1) * (self.planned - self.done)
+        return self.spent / max(self.done, 1) * (self.planned - self.done + self.afterwards)
 
     def fraction(self) -> float:
-        """Of the structures planned."""
-        return self.done / max(self.planned, 1)
+        """Of all of it."""
+        return self.done / max(self.planned + self.afterwards, 1)
 
 
 def drawn_of(

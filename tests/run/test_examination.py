@@ -189,7 +189,9 @@ def test_sampling_tells_how_far_it_is_and_how_long_it_takes_at_most(whole):
     parts = [each for each in told if each.fraction is not None]
     assert parts
     assert all(0.0 < each.fraction <= 1.0 and each.seconds_left >= 0.0 for each in parts)
-    assert parts[-1].seconds_left == pytest.approx(0.0, abs=1e-6)
+    (raising,) = [each for each in whole[1] if each.text.endswith("design is raised")]
+    assert raising.seconds_left == pytest.approx(parts[-1].seconds_left), "nothing else is left"
+    assert raising.seconds_left > 0.0
 
 
 def test_the_judgement_of_a_design_in_a_search_tells_how_far_it_is(found):

@@ -469,7 +469,9 @@ def test_designs_are_drawn_in_full_from_the_last_on_until_one_holds(
     monkeypatch.setattr(examination, "open_checks", lambda found, name: name in open_ones)
     monkeypatch.setattr(examination, "to_build", lambda found, every: best)
     monkeypatch.setattr(examination, "_failure", lambda desk, each, count: (each.name, count))
-    monkeypatch.setattr(examination, "_raised", lambda desk, each, so_far: raised.append(each.name) or so_far)
+    monkeypatch.setattr(
+        examination, "_raised", lambda desk, each, so_far, clock: raised.append(each.name) or so_far
+    )
     monkeypatch.setattr(examination, "falls", lambda designs, name, safety: name == "optimised")
     monkeypatch.setattr(examination, "asked_as_built", lambda case: "asked")
     monkeypatch.setattr(examination, "_thicker", lambda desk, run: "thicker")
@@ -491,6 +493,17 @@ def test_designs_are_drawn_in_full_from_the_last_on_until_one_holds(
     monkeypatch.setattr(examination, "to_build", lambda found, every: "unbraced")
     unbraced = examination.examine(desk)
     assert (unbraced.failure, unbraced.rare, unbraced.thicker) == (None, None, None)
+
+
+def test_the_time_that_is_left_counts_how_the_design_is_raised_until_it_is(monkeypatch, tmp_path):
+    monkeypatch.setattr(examination, "raised", lambda shell, design: ("by",))
+    clock, desk = Clock(10, afterwards=5), Desk(tmp_path)
+    clock.took(10, 20.0)
+    given = examination._raised(desk, examined(), told(), clock)
+    assert given.designs["initial"].ways_up == ("by",)
+    assert desk.said == [("how the initial design is raised", 10.0)]
+    assert clock.left() == 0.0
+    assert examination._raised(desk, examined(), given, clock) is given, "once"
 
 
 def test_of_a_design_that_falls_behind_once_it_is_drawn_in_full_neither_verdict_nor_failure_is_told(

@@ -38,3 +38,6 @@ def test_how_rarely_it_falls_is_the_probability_or_the_least_share_that_was_reac
     assert told == [3, 3]
     kept = rare_failures.read_drawn(tmp_path, "one-rare", "key 20").paths["wind"]
     assert kept.stand == (False, True, True)
+    rare_failures.rare_of(tmp_path, one, "snow", count=20, seed=7, tell=told.append)
+    assert asked[-1] == (7, 20, []), "nothing of another load"
+    assert set(rare_failures.read_drawn(tmp_path, "one-rare", "key 20").paths) == {"wind", "snow"}

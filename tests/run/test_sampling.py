@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from shellform.gridshell.tolerances import Tolerances
 from shellform.records.drawn import DrawnPath, DrawnShape, DrawnSnap, read_drawn
 from shellform.reliability.perfect import TO_ITS_END
 from shellform.run import sampling
@@ -112,3 +113,28 @@ def test_what_is_left_is_told_by_what_the_structures_took_that_were_drawn():
     assert clock.planned == 0
     clock.took(5, 5.0)
     assert (clock.planned, clock.left(), clock.fraction()) == (15, 0.0, 1.0)
+
+
+def test_what_is_left_counts_what_comes_after_the_structures_too():
+    clock = Clock(40, afterwards=10)
+    clock.took(10, 25.0)
+    assert (clock.left(), clock.fraction()) == (100.0, 0.2)
+    clock.took(30, 75.0)
+    assert (clock.left(), clock.fraction()) == (25.0, 0.8), "no noughts while it goes on"
+
+
+def test_structures_are_kept_under_another_key_where_two_loads_have_changed_names():
+    """Paths are kept by the names of their loads: one would be taken for the other's."""
+    none = np.zeros(0)
+    beams = SimpleNamespace(axial=none, bending_y=none, bending_z=none, torsion=none, rest_length=none)
+    cables = SimpleNamespace(ends=none, rest_length=none, stiffness=none)
+    shell = SimpleNamespace(
+        target=SimpleNamespace(positions=none),
+        network=lambda design: SimpleNamespace(beams=beams, cables=cables),
+    )
+
+    def key(**loads):
+        return Examined("one", shell, None, loads, Tolerances()).key(7)
+
+    assert key(wind=DESIGN, snow=2.0 * DESIGN) == key(wind=DESIGN, snow=2.0 * DESIGN)
+    assert key(wind=DESIGN, snow=2.0 * DESIGN) != key(snow=DESIGN, wind=2.0 * DESIGN)
