@@ -129,6 +129,8 @@ def _going_up(judged: _Judged, name: str, required: bool) -> Cell:
     way = easiest(row.ways_up)
     if way.utilisation is None:
         return Cell(borne_words(way), None, required)
+    if not way.strength_known:
+        return UNASKED
     there = row.loads["none"].stressed if "none" in row.loads else way.utilisation
     cell = share_of(way.utilisation, judged.rods[name].reserved(there, way.utilisation))
     return replace(cell, found=borne_words(way), asked=required)

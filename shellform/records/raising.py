@@ -12,9 +12,10 @@ SCAFFOLD = "scaffold"
 class WayUpRecord:
     """One way up: `by` "supports" that move in or a "scaffold", and whether that is under `every` crossing.
 
-    On it rods bear at most so much of their strength, `utilisation`, in a `stage`. The largest force on a
-    support, `reaction`; a scaffold pushes a crossing with up to `push` and holds `held_down` crossings down
-    with up to `pull`, N. Where no stable path leads up, the reason why is `lost`, and the others are None.
+    On it rods bear at most so much of their strength, `utilisation` (0: the strength isn't known), in a
+    `stage`. The largest force on a support, `reaction`; a scaffold pushes a crossing with up to `push` and
+    holds `held_down` crossings down with up to `pull`, N. Where no stable path leads up, the reason why is
+    `lost`, and the others are None.
     """
 
     by: str
@@ -26,6 +27,11 @@ class WayUpRecord:
     pull: float | None = None
     held_down: int | None = None
     lost: str = ""
+
+    @property
+    def strength_known(self) -> bool:
+        """Whether what rods bear could be told of their strength: bent rods bear something."""
+        return self.utilisation is not None and self.utilisation > 0.0
 
 
 def easiest(ways: Sequence[WayUpRecord]) -> WayUpRecord:

@@ -174,6 +174,8 @@ def raising_words(ways: Sequence[WayUpRecord]) -> str:
     best = easiest(ways)
     if best.utilisation is None:
         return f"No stable path was found on which the grid goes up: {best.lost}"
+    if not best.strength_known:
+        return f"The grid goes up by {way_up_words(best)}; the rods' strength, of which they bear some, isn't known"
     others = "".join(f", {borne_words(each)}" for each in ways if each is not best)
     return f"On the way up rods bear up to {borne_words(best, ' of their strength')}{others}"
 

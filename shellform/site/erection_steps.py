@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,7 +80,7 @@ class Erection:
 
     @property
     def utilisation(self) -> float:
-        """The largest stress on the way over the strength."""
+        """The largest stress on the way over the strength; 0 where that isn't known."""
         return self.worst.stress / self.strength
 
     @property
@@ -104,7 +105,7 @@ class Erection:
                 f"{each.share:.3f}",
                 f"{1e3 * each.height:.2f}",
                 f"{1e-6 * each.stress:.2f}",
-                f"{each.stress / self.strength:.3f}",
+                None if math.isinf(self.strength) else f"{each.stress / self.strength:.3f}",
                 each.element,
                 f"{each.tension:.3f}",
                 f"{each.reaction:.3f}",

@@ -50,6 +50,7 @@ UP = WayUpRecord("scaffold", True, 0.9, "raising", 1234.0, 22.1, 13.0, 75)
         ({}, "By a scaffold under every crossing", True),
         ({"every": False}, "By a scaffold under every second crossing", True),
         ({"by": "supports"}, "By supports that move in", True),
+        ({"utilisation": 0.0}, "By a scaffold under every crossing", None),  # of an unknown strength
         ({"utilisation": 0.951}, "By a scaffold under every crossing", None),
         ({"utilisation": 1.0 + 0.99 * SLACK}, "By a scaffold under every crossing", None),
         ({"utilisation": 1.0 + 1.01 * SLACK}, "Rods break on the way up", False),

@@ -117,6 +117,16 @@ def test_what_rods_bear_on_the_way_up_is_told_of_the_easiest_way_and_of_those_th
     assert raising_words((NO_WAY, NO_WAY)).endswith("the grid goes up: It snaps")
 
 
+def test_rods_whose_strength_isn_t_known_are_told_to_bear_no_share_of_it_on_the_way_up(shell, designs):
+    """Their stress over what isn't known counts as 0, as it does under loads."""
+    unknown = replace(BY_SCAFFOLD, utilisation=0.0)
+    assert raising_words((unknown,)) == (
+        "The grid goes up by a scaffold under every crossing; the rods' strength, of which they bear some, isn't known"
+    )
+    asked = replace(BOUNDS, safety=AsBuilt(0.99, 0.99, 200))
+    assert "Rods on the way up" not in found(shell, designs, bounds=asked, ways_up=(unknown,))
+
+
 @pytest.mark.parametrize(
     ("share", "holds", "told"),
     [(1.0009, True, "100.1 %"), (1.0011, False, "100.1 %"), (0.5, True, "50 %"), (1.004, False, "100.4 %")],

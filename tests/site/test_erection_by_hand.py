@@ -31,6 +31,8 @@ def test_the_worst_step_is_that_of_the_largest_stress_and_the_table_has_its_unit
     assert rows[1] == "moving supports,0.250,1234.50,80.00,0.333,7,0.500,12.000"
     assert rows[2].split(",")[2:5] == ["2000.00", "123.46", "0.514"]
     assert built.props is None
+    unknown = Erection((low,), np.inf)
+    assert (unknown.utilisation, unknown.table().splitlines()[1].split(",")[4]) == (0.0, "")
 
 
 def test_the_table_of_a_grid_on_a_scaffold_tells_what_that_bears_as_long_as_it_is_there():

@@ -240,7 +240,7 @@ def _is_raised(ways: Sequence[WayUpRecord]) -> Answer:
     detail = ". ".join([raising_words(ways), f"On it {', '.join(needs)}"])
     if best.utilisation > 1.0 + SLACK:
         return Answer(question, "Rods break on the way up", detail, good=False)
-    spared = best.utilisation <= _SPARED
+    spared = best.strength_known and best.utilisation <= _SPARED
     return Answer(question, words, detail, good=spared or None, open=not spared)
 
 
