@@ -29,8 +29,7 @@ MILLINEWTONS: Final = {"mN": 1e-3}
 MASSES: Final = {"g": 1e-3}
 """By their names, so much of each in the SI unit."""
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_NEWTONS: Final = (("MN", 1e6), ("kN", 1e3))
-_TEN: Final = 10.0  # of a unit: what is told in it
+_NEWTONS: Final = ((1e7, "MN", 1e6), (1e3, "kN", 1e3))  # from so many N on, so many N a unit
 _TWICE = 1e3  # what is lost where a number in the SI unit was taken for one in its thousandth
 
 
@@ -106,12 +105,17 @@ def coordinates(point: Iterable[float], digits: int = 3) -> str:
     return "(" + ", ".join(f"{each:.{digits}g}" for each in point) + ")"
 
 
+def force_unit(most: float) -> tuple[str, float]:
+    """The unit in which forces up to `most`, N, are read, and how many N it is: N below 1 kN, kN below
+    10 MN."""
+    return next(((unit, size) for least, unit, size in _NEWTONS if abs(most) >= least), ("N", 1.0))
+
+
 def newtons(force: float, digits: int = 3) -> str:
-    """A force, N, for people, with its unit: N below 10 kN, kN below 10 MN."""
-    for unit, size in _NEWTONS:
-        if abs(force) >= _TEN * size:
-            return f"{number(force / size, digits)} {unit}"
-    return f"{number(force, digits)} N"
+    """A force, N, for people, with its unit, which is that of the number that is told."""
+    told = float(f"{force:.{digits - 1}e}")
+    unit, size = force_unit(told)
+    return f"{number(force / size, digits)} {unit}"
 
 
 ROD_SIZE: Final = Quantity(

@@ -65,7 +65,7 @@ def test_how_a_shell_is_raised_is_told_with_what_it_takes(changed, words, good):
 def test_what_supports_and_a_scaffold_bear_as_it_is_raised_is_told_in_newtons():
     told = first_answers._is_raised((UP,))
     assert told.detail.endswith(
-        "of their strength by a scaffold under every crossing. On it supports bear up to 1\u202f234 N, each prop pushes with up "
+        "of their strength by a scaffold under every crossing. On it supports bear up to 1.23 kN, each prop pushes with up "
         "to 22.1 N, up to 75 crossings are held down with up to 13 N"
     )
     alone = first_answers._is_raised((replace(UP, held_down=0),))

@@ -278,6 +278,22 @@ def test_as_many_trials_are_told_as_rejected_as_the_history_marks_so(shell, vaul
     assert "3 evaluations, 2 of them rejected" in report.html([run], {"shellform": "0"})
 
 
+@pytest.mark.parametrize(("times", "unit"), [(1.0, "N"), (1e3, "kN")])
+def test_all_forces_of_the_tables_are_read_in_the_unit_of_the_view(shell, vault, times, unit):
+    run = run_of(shell, vault, shell.design(), shell.target)
+    own = run.summary.designs["initial"]
+    loads = {name: replace(row, cable_force_max=times * 19.8) for name, row in own.loads.items()}
+    heavy = replace(own, cable_force_max=times * 18.7, cable_force_sum=times * 132.0, loads=loads)
+    text = report.html([replace(run, summary=run.summary.with_design("initial", heavy))], {"shellform": "0"})
+    assert f"Largest force [{unit}]" in text
+    assert f"All forces [{unit}]" in text
+    assert '<td class="num">18.7</td><td class="num">132</td>' in text
+    two = report.html(
+        [replace(run, summary=run.summary.with_design("initial", heavy)), run], {"shellform": "0"}
+    )
+    assert f"Largest cable force [{unit}]" in two, "one for all runs"
+
+
 def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
     moved = State(shell.target.positions + 0.001, shell.target.quaternions)
     design = shell.design()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shellform.quantities import newtons, number
+from shellform.quantities import force_unit, newtons, number
 from shellform.records import words
 from shellform.records.as_built import AsBuilt, critical_checks, falls, guide_checks, standing_checks
 from shellform.records.check import SLACK, Cell, Check, below, quantity, share_of
@@ -531,14 +531,20 @@ def test_forces_are_told_in_newtons_kilonewtons_or_meganewtons_with_digits_in_gr
     told = {
         0.0: "0 N",
         4.62: "4.62 N",
-        9990.0: "9\u202f990 N",
+        999.4: "999 N",
+        999.6: "1 kN",
+        9990.0: "9.99 kN",
         14400.0: "14.4 kN",
         -14400.0: "-14.4 kN",
         1.44e6: "1\u202f440 kN",
+        9.99e6: "9\u202f990 kN",
         2.3e7: "23 MN",
     }
     assert {force: newtons(force) for force in told} == told
     assert newtons(2274530.0, 6) == "2\u202f274.53 kN"
+    assert [force_unit(most) for most in (0.0, 999.9, 1e3, 1e7)] == [
+        ("N", 1.0), ("N", 1.0), ("kN", 1e3), ("MN", 1e6)
+    ]  # fmt: skip
     assert quantity(14400.0, "N") == "14.4 kN"
     assert quantity(14400.0, "mm") == "14\u202f400 mm"
 

@@ -157,8 +157,8 @@ def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, 
     ]
     borne = Props(push=9570.4, pull=1086.4, pulled=108, rope=240.4)
     assert onsite.erect(tmp_path, load="wet", lift="none", step=0.125).lines[3:] == [
-        "the scaffold pushes crossings up with up to 9\u202f570 N each and holds up to 108 of them down, where the grid would "
-        "lift off, with up to 1\u202f086 N; ropes draw rods' ends in with up to 240 N",
+        "the scaffold pushes crossings up with up to 9.57 kN each and holds up to 108 of them down, where the grid would "
+        "lift off, with up to 1.09 kN; ropes draw rods' ends in with up to 240 N",
         "in the end it lies up to 20 mm from where the design does under the load “wet”",
         "rods break on the way: prop every crossing (--props every), or choose thinner or stronger rods",
     ]

@@ -27,7 +27,7 @@ from shellform.output.page.shown_run import ShownRun
 from shellform.output.page.template import filled, part
 from shellform.output.page.view_data import ViewedShell, controls, view_data
 from shellform.output.pictures.colours import VIRIDIS
-from shellform.quantities import number
+from shellform.quantities import force_unit, number
 from shellform.records import words
 from shellform.records.check import UNASKED, Cell, Check, Subject
 from shellform.records.summary import Summary
@@ -54,6 +54,7 @@ def html(runs: Sequence[ShownRun], versions: Mapping[str, str]) -> str:
             "runs": [_content(run, number) for number, run in enumerate(runs)],
             "differences": _differences(runs),
             "versions": versions,
+            "forces": dict(zip(("unit", "size"), force_unit(_largest_force(runs)), strict=True)),
         },
         generator=GENERATOR,
         style=part("look.css") + part("style.css"),
@@ -121,6 +122,13 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         "row": best,
         **controls(viewed(run), _GRADIENT),
     }
+
+
+def _largest_force(runs: Sequence[ShownRun]) -> float:
+    """Of a cable under any load, N, by which the view, too, chooses the unit that all forces are read in."""
+    designs = [run.summary.designs[name] for run in runs for name in run.designs]
+    loaded = [row.cable_force_max or 0.0 for each in designs for row in each.loads.values()]
+    return max([*loaded, *(each.cable_force_max for each in designs)], default=0.0)
 
 
 def viewed(run: ShownRun) -> ViewedShell:

@@ -21,7 +21,7 @@ from shellform.arrays import Reals, Record
 from shellform.errors import how_many
 from shellform.output.pictures.colours import VIRIDIS
 from shellform.output.pictures.panel import Look, Panel, Scale
-from shellform.quantities import number
+from shellform.quantities import force_unit, number
 
 Colours = NDArray[np.uint8]
 """Red, green, blue (n, 3)."""
@@ -101,7 +101,7 @@ def title(panel: Panel, scale: Scale, size: tuple[int, int]) -> tuple[Word, ...]
         cables = how_many(count, "cable", "cables")
         caption += f"; {cables}" if taut == count else f"; {taut} of {cables} taut"
     if taut:
-        label, size_of = _newtons(scale.force)
+        label, size_of = force_unit(scale.force)
         caption += f", {number(float(panel.cable_forces.max()) / size_of)} {label} at most"
     line = scale.letters
     words: list[Word] = []
@@ -150,7 +150,7 @@ def key(scale: Scale, width: int, height: int) -> tuple[tuple[Word, ...], tuple[
     ramps = [ramp]
     if scale.force > 0.0:
         caption = "cable force (pale: slack)" if scale.slack else "cable force"
-        label, size_of = _newtons(scale.force)
+        label, size_of = force_unit(scale.force)
         more, ramp = _bar(caption, label, scale.force / size_of, "", cable_colours, ends[1], width, line)
         words, ramps = words + more, [*ramps, ramp]
     return tuple(words), tuple(ramps)
@@ -178,11 +178,6 @@ def _bar(
     words.append(Word(quantity, (0.5 * (left + right), _CAPTION * line), line, QUIET, justify="center"))
     painted = colours((np.arange(right - left) + 0.5) / (right - left))
     return words, Ramp(left, right, round(1.9 * line), round(2.8 * line), painted)
-
-
-def _newtons(force: float) -> tuple[str, float]:
-    """The unit that forces up to this one, N, are read in."""
-    return ("kN", 1e3) if force >= 1e3 else ("N", 1.0)
 
 
 def _between(table: Reals, share: Reals) -> Colours:
