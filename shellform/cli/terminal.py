@@ -94,7 +94,8 @@ def tell_designs(summary: Summary) -> None:
 
 
 def tell_verdict(verdict: VerdictRecord) -> None:
-    """Whether the design to build holds; each check that fails or could not be made."""
+    """Whether the design to build holds; each check that fails or could not be made, and what asks for
+    care."""
     from shellform.records.verdict import headline
 
     print(headline(verdict))
@@ -102,6 +103,8 @@ def tell_verdict(verdict: VerdictRecord) -> None:
         print(f"  fails: {sentence}")
     for name in verdict.not_examined:
         print(f"  not examined: {name}")
+    for sentence in verdict.cautions:
+        print(f"  caution: {sentence}")
 
 
 def tell_as_built(summary: Summary) -> None:

@@ -15,7 +15,7 @@ from itertools import combinations
 from shellform.quantities import number
 from shellform.records.check import UNASKED, UNKNOWN, Cell, Check, Subject
 from shellform.records.remedies import RodsOf
-from shellform.records.summary import DesignRecord, LoadRecord
+from shellform.records.summary import DesignRecord, LoadRecord, StandingRecord
 from shellform.records.words import critical_words, load_title, standing_words
 from shellform.reliability.safety import allowed
 
@@ -23,15 +23,26 @@ EQUAL = 1e-3  # relative: critical factors that count as equal
 
 
 @dataclass(frozen=True)
+class Farthest:
+    """How `far`, m, a structure as built may snap on its way without asking for care, and `of` what that is,
+    in words."""
+
+    far: float
+    of: str
+
+
+@dataclass(frozen=True)
 class AsBuilt:
     """The share of drawn structures that must stand under the `design` load, and under every `other` one
     (None: no less than of the initial design, and never more than under the design load), of so many `drawn`;
-    only told where it isn't `required`."""
+    only told where it isn't `required`. Those that `snap` farther than that on their way stand, and ask for
+    care (None: none does)."""
 
     design: float
     other: float | None
     drawn: int
     required: bool = True
+    snap: Farthest | None = None
 
 
 def standing_checks(
@@ -134,8 +145,19 @@ def _drawn(design: DesignRecord, load: str, rods: RodsOf, fallen: int, safety: A
         lowest = own.lowest or 0.0
         remedy = rods.stronger(1.0 / lowest if lowest > 0.0 else math.inf)
         return Cell(words, False, safety.required, remedy, own.standing / own.drawn)
-    enough = own.drawn >= safety.drawn
-    return Cell(words, True if enough else None, safety.required, "", own.standing / own.drawn)
+    enough, caution = own.drawn >= safety.drawn, _snapping(own, safety.snap)
+    return Cell(words, True if enough else None, safety.required, "", own.standing / own.drawn, caution)
+
+
+def _snapping(own: StandingRecord, most: Farthest | None) -> str:
+    """That structures snap farther on their way than is without care; "" where none does."""
+    if most is None or own.snap <= most.far:
+        return ""
+    far, without_care = (number(1e3 * each, 2) for each in (own.snap, most.far))
+    return (
+        f"{own.snapped} of {own.drawn} structures as built {'snaps' if own.snapped == 1 else 'snap'} at a rod's end or a cell "
+        f"on the way, by up to {far} mm: more than the {without_care} mm of {most.of}"
+    )
 
 
 def critical_checks(

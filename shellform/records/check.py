@@ -17,14 +17,15 @@ SLACK = 1e-3  # of a limit: what the optimiser itself lets pass
 @dataclass(frozen=True)
 class Cell:
     """One check of one design: what it `found`, in words, whether it `holds` (None: that isn't known),
-    whether it was `asked` for at all, the `remedy` where it doesn't hold, and of drawn structures the `share`
-    that stands."""
+    whether it was `asked` for at all, the `remedy` where it doesn't hold, of drawn structures the `share`
+    that stands, and what asks for care although it holds (`caution`)."""
 
     found: str
     holds: bool | None
     asked: bool = True
     remedy: str = ""
     share: float | None = None
+    caution: str = ""
 
 
 class Subject(Enum):

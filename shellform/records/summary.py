@@ -238,12 +238,14 @@ class DocumentsRecord:
 @dataclass(frozen=True)
 class VerdictRecord:
     """Whether the `design` to build `holds`: what `failed`, a sentence with reason and remedy each, and the
-    checks that were asked for and `not_examined`. It holds where neither is (verdict.py)."""
+    checks that were asked for and `not_examined`. It holds where neither is (verdict.py); `cautions`, a
+    sentence each, ask for care all the same."""
 
     design: str
     holds: bool
     failed: tuple[str, ...]
     not_examined: tuple[str, ...]
+    cautions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

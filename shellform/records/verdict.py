@@ -1,5 +1,6 @@
-"""Which design is to be built, and the verdict on it: holds, does not hold, or is not examined. Terminal,
-summary.json and page all show the one made here."""
+"""Which design is to be built, and the verdict on it: holds, does not hold, or is not examined. What holds
+may ask for care all the same, which changes nothing in that. Terminal, summary.json and page all show the one
+made here."""
 
 from __future__ import annotations
 
@@ -36,7 +37,17 @@ def verdict(found: Sequence[Check], design: str) -> VerdictRecord:
     """Whether the design holds, by its checks: the reason and then the remedy of each that fails."""
     broken = tuple(_sentence(check, check.cells[design]) for check in failed(found, design))
     unknown = tuple(check.name for check in open_checks(found, design))
-    return VerdictRecord(design, not broken and not unknown, broken, unknown)
+    return VerdictRecord(design, not broken and not unknown, broken, unknown, _cautions(found, design))
+
+
+def _cautions(found: Sequence[Check], design: str) -> tuple[str, ...]:
+    """What asks for care of a design, each once, after the names of the checks that say it."""
+    named: dict[str, list[str]] = {}
+    for check in found:
+        cell = check.cells.get(design, UNASKED)
+        if cell.asked and cell.caution:
+            named.setdefault(cell.caution, []).append(check.name)
+    return tuple(f"{', '.join(names)}: {caution}." for caution, names in named.items())
 
 
 def to_build(found: Sequence[Check], designs: Sequence[str]) -> str:
@@ -66,7 +77,8 @@ def headline(record: VerdictRecord) -> str:
         return f"{name} does not hold: {how_many(len(record.failed), 'check fails', 'checks fail')}."
     if record.not_examined:
         return f"{name} is not examined: {how_many(len(record.not_examined), 'check is', 'checks are')} still open."
-    return f"{name} holds: all checks do."
+    care = f", with {how_many(len(record.cautions), 'caution', 'cautions')}" if record.cautions else ""
+    return f"{name} holds: all checks do{care}."
 
 
 def _sentence(check: Check, cell: Cell) -> str:

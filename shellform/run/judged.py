@@ -8,7 +8,7 @@ from dataclasses import replace
 from shellform.case.build_rod import rod_sizes
 from shellform.case.build_safety import critical_factors_asked, is_required
 from shellform.case.case import Case
-from shellform.records.as_built import AsBuilt
+from shellform.records.as_built import AsBuilt, Farthest
 from shellform.records.check import Cell, Check
 from shellform.records.checks import checks
 from shellform.records.limited import Bounds
@@ -16,6 +16,7 @@ from shellform.records.stages import SHOWING
 from shellform.records.summary import VerdictRecord
 from shellform.records.verdict import to_build, verdict
 from shellform.run.folder import Run
+from shellform.run.sizes import OF_SPAN, may_come_off
 
 _SKETCH = Cell("a sketch: coarse elements, few evaluations, no structures drawn", None)
 
@@ -36,7 +37,7 @@ def run_checks(run: Run) -> list[Check]:
         slack=limits.slack_min,
         slack_loads=tuple(limits.slack_loads),
         critical=critical_factors_asked(run.case),
-        safety=asked_as_built(run.case),
+        safety=replace(asked_as_built(run.case), snap=_farthest_snap(run)),
         rods=rod_sizes(
             run.case.rod,
             run.shell.rod,
@@ -55,6 +56,20 @@ def asked_as_built(case: Case) -> AsBuilt:
     """How many drawn structures the case asks to stand."""
     safety = case.safety
     return AsBuilt(safety.probability_design, safety.probability_additional, safety.drawn, is_required(case))
+
+
+def _farthest_snap(run: Run) -> Farthest:
+    """How far a structure as built may snap on its way without asking for care: the least of the deviations
+    that the case limits or wishes for, and where it says none, what `new` would wish for."""
+    limits = run.case.limits
+    said = {
+        "limits.built_deviation": limits.built_deviation,
+        "limits.deviation": limits.deviation,
+        "optimise.deviation": run.case.optimise.deviation,
+    }
+    known = [Farthest(far, entry) for entry, far in said.items() if far is not None]
+    usual = Farthest(may_come_off(run.surface, 0.0), f"a {OF_SPAN:g}th of the span")
+    return min(known, key=lambda each: each.far, default=usual)
 
 
 def judged(run: Run) -> VerdictRecord:

@@ -150,12 +150,14 @@ def test_errors_of_ours_are_not_told_as_refusals():
 HOLDS = VerdictRecord("polished", True, (), ())
 FAILS = VerdictRecord("polished", False, ("Stands: no.",), ())
 OPEN = VerdictRecord("polished", False, (), ("As built",))
+CARE = VerdictRecord("polished", True, (), (), ("As built: it snaps.",))
 
 
 @pytest.mark.parametrize(
     ("verdict", "until", "sketch", "status"),
     [
         (HOLDS, "report", False, None),
+        (CARE, "report", False, None),
         (FAILS, "report", False, 3),
         (FAILS, "initial", False, 3),
         (FAILS, "report", True, 3),

@@ -93,11 +93,18 @@ def test_no_factor_is_told_of_an_additional_load_that_is_no_multiple_of_the_desi
         ({"stands": None}, "Not examined as built", None),
         ({"as_built": replace(AS_BUILT, holds=False)}, "97 of 100 structures as built stand", False),
         ({"as_built": replace(AS_BUILT, holds=None)}, "97 of 100 structures as built stand", None),
+        ({"as_built": replace(AS_BUILT, caution="3 snap")}, "97 of 100 structures as built stand", None),
     ],
 )  # fmt: skip
 def test_what_stands_worst_with_the_perfect_shell_is_told_first_and_then_the_drawn_ones(changed, words, good):
     told = safe(**changed)
     assert (told.words, told.good, told.open) == (words, good, good is None)
+
+
+def test_what_asks_for_care_although_the_shell_stands_is_told_with_how_sure_that_is():
+    told = safe(as_built=replace(AS_BUILT, caution="3 snap"))
+    assert "with 95 % confidence. That some snap so far asks for care. As planned" in told.detail
+    assert safe(as_built=replace(AS_BUILT, holds=False, caution="3 snap")).good is False
 
 
 @pytest.mark.parametrize(("standing", "sure"), [(95, True), (94, False), (40, False), (100, True)])

@@ -20,7 +20,7 @@ from shellform.output.page.embed import embed
 from shellform.output.page.first_answers import answers
 from shellform.output.page.shown_run import ShownRun
 from shellform.quantities import number
-from shellform.records.check import Cell
+from shellform.records.check import Cell, Check
 from shellform.records.summary import BuiltShapeRecord, StandingRecord, VerdictRecord
 from shellform.records.words import constraint_titles
 from shellform.structure.elements.state import State
@@ -276,6 +276,43 @@ def test_as_many_trials_are_told_as_rejected_as_the_history_marks_so(shell, vaul
     run = replace(run_of(shell, vault, shell.design(), shell.target), history=steps)
     assert run.summary.optimisation.rejected == 1
     assert "3 evaluations, 2 of them rejected" in report.html([run], {"shellform": "0"})
+
+
+@pytest.mark.parametrize(
+    ("verdict", "kind", "words", "badge"),
+    [
+        (VerdictRecord("initial", True, (), ()), "good", "Holds", "to build"),
+        (VerdictRecord("initial", True, (), (), ("It snaps.",)), "open", "Holds, with a caution", "to build"),
+        (VerdictRecord("initial", False, (), ("Stands",)), "open", "Not examined", "best so far"),
+        (
+            VerdictRecord("initial", False, ("No.",), (), ("It snaps.",)),
+            "bad",
+            "Does not hold",
+            "best so far",
+        ),
+    ],
+)
+def test_the_page_shows_the_verdict_in_its_colour_with_what_asks_for_care(
+    shell, vault, verdict, kind, words, badge
+):
+    run = replace(run_of(shell, vault, shell.design(), shell.target), verdict=verdict)
+    text = report.html([run, run], {"shellform": "0"})
+    assert f'<div class="verdict {kind}">' in text
+    assert f'<span class="badge {kind}">{words}</span>' in text
+    assert f'<span class="badge {kind}">{badge}</span>' in text
+    assert ("<li>Caution: It snaps.</li>" in text) == bool(verdict.cautions)
+
+
+def test_a_check_that_holds_and_asks_for_care_is_amber(shell, vault):
+    cell = Cell("200 of 200 stand", True, caution="1 snaps")
+    run = replace(
+        run_of(shell, vault, shell.design(), shell.target),
+        checks=[Check("As built", "198", {"initial": cell})],
+    )
+    text = report.html([run], {"shellform": "0"})
+    assert (
+        '<span class="mark open">✓<span class="spoken"> pass, with a caution</span></span> 200 of 200' in text
+    )
 
 
 @pytest.mark.parametrize(("times", "unit"), [(1.0, "N"), (1e3, "kN")])

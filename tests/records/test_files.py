@@ -50,7 +50,7 @@ def test_a_summary_is_read_back_as_it_was_written(tmp_path):
     whole = summary(NAMES).with_design("polished", design(loads={"design": row}, ways_up=ways))
     whole = replace(
         whole,
-        verdict=VerdictRecord("polished", False, ("Rods",), ()),
+        verdict=VerdictRecord("polished", False, ("Rods",), (), ("As built: it snaps.",)),
         failed={"figures": "no OpenGL"},
         seconds={"net": 1.0},
     )

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from shellform.cli.terminal import tell_designs
-from shellform.records.as_built import AsBuilt
+from shellform.cli.terminal import tell_designs, tell_verdict
+from shellform.records.as_built import AsBuilt, Farthest
 from shellform.records.checks import checks
 from shellform.records.limited import Bounds
 from shellform.records.optimisation import CableCountRecord, SymmetryRecord
@@ -236,6 +236,50 @@ def test_as_many_structures_stand_as_of_the_initial_design_and_are_drawn_in_full
     assert check.cells["polished"].found.startswith(
         f"{last[1]} of {last[0]} structures as built stand (at least"
     )
+
+
+SNAPPED = {"snapped": 3, "snap": 0.082}
+FARTHEST = Farthest(0.03, "optimise.deviation")
+
+
+@pytest.mark.parametrize(
+    ("snapped", "farthest", "care"),
+    [
+        (SNAPPED, FARTHEST, True),
+        (SNAPPED | {"snap": 0.03}, FARTHEST, False),
+        ({}, FARTHEST, False),
+        (SNAPPED, None, False),
+    ],
+)
+def test_a_design_whose_structures_snap_far_on_their_way_holds_and_asks_for_care(
+    shell, designs, snapped, farthest, care, capsys
+):
+    own = AsBuilt(0.99, 0.99, 200, snap=farthest)
+    check = as_built(shell, designs, None, standing(200, 200, **snapped), own)
+    told = verdict([check, replace(check, title="As built under the design load")], "polished")
+    assert told.holds
+    assert told.failed == told.not_examined == ()
+    assert told.cautions == (
+        (
+            "As built under 1.2 × the load, As built under the design load: 3 of 200 structures as built snap at a rod's end or "
+            "a cell on the way, by up to 82 mm: more than the 30 mm of optimise.deviation.",
+        )
+        if care
+        else ()
+    ), "once"
+    assert headline(told) == f"The polished design holds: all checks do{', with 1 caution' if care else ''}."
+    tell_verdict(told)
+    assert capsys.readouterr().out.splitlines() == [
+        headline(told),
+        *(f"  caution: {each}" for each in told.cautions),
+    ]
+    assert check.cells["polished"].holds is True
+
+
+def test_what_is_only_told_asks_for_no_care_in_the_verdict(shell, designs):
+    own = AsBuilt(0.99, 0.99, 200, required=False, snap=FARTHEST)
+    check = as_built(shell, designs, None, standing(200, 200, **SNAPPED), own)
+    assert verdict([check], "polished").cautions == ()
 
 
 def test_what_is_only_told_fails_no_design(shell, designs):

@@ -2,10 +2,15 @@
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
 
 from shellform.case.limit_entries import LimitsEntry
 from shellform.quantities import newtons, number
+from shellform.records.as_built import Farthest
 from shellform.records.summary import read_summary
+from shellform.run import judged
 from shellform.run.folder import read_run
 from shellform.run.judged import run_checks
 from shellform.run.run import run_case
@@ -22,6 +27,25 @@ LIMITS = {
     "thrust": "Thrust on a support under any load",
     "slack_min": "Least pull of a cable under no load",
 }
+
+
+@pytest.mark.parametrize(
+    ("built", "limit", "wish", "most"),
+    [
+        (0.3, None, 0.03, Farthest(0.03, "optimise.deviation")),
+        (0.02, None, 0.03, Farthest(0.02, "limits.built_deviation")),
+        (0.3, 0.01, 0.03, Farthest(0.01, "limits.deviation")),
+        (0.3, None, None, Farthest(0.3, "limits.built_deviation")),
+        (None, None, None, Farthest(0.024, "a 500th of the span")),
+    ],
+)
+def test_structures_may_snap_as_far_without_care_as_the_least_deviation_that_is_limited_or_wished_for(
+    monkeypatch, built, limit, wish, most
+):
+    limits = SimpleNamespace(built_deviation=built, deviation=limit)
+    case = SimpleNamespace(limits=limits, optimise=SimpleNamespace(deviation=wish))
+    monkeypatch.setattr(judged, "may_come_off", lambda surface, thickness: surface / 500.0 + thickness)
+    assert judged._farthest_snap(SimpleNamespace(case=case, surface=12.0)) == most
 
 
 def test_every_limit_of_a_case_is_a_check_of_its_designs(tmp_path):
@@ -49,7 +73,7 @@ def test_every_limit_of_a_case_is_a_check_of_its_designs(tmp_path):
         f"{number(math.degrees(2e-6))} °",
         f"{number(3e-6)} N",
         f"{number(4e-6)} N",
-        "at least 1\u202f000 N",
+        "at least 1 kN",
     ]
     told = run.summary.designs["initial"].loads.values()
     assert found[LIMITS["thrust"]].found == newtons(max(each.thrust_max for each in told))

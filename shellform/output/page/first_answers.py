@@ -212,6 +212,9 @@ def _is_safe(
         if safe and more.stands.standing < _SAFE * more.stands.drawn:
             safe, words = None, f"Not surely: {words}"
             sure += "No more are asked for. "
+        elif safe and as_built.caution:
+            safe = None
+            sure += "That some snap so far asks for care. "
     rods = f", rods at {100.0 * used:.0f} % of their strength" if known else ""
     off = f"{_mm(more.deviation_max)} off at most, {_mm(more.deviation_mean)} in the mean{rods}"
     return Answer(

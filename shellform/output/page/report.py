@@ -30,7 +30,7 @@ from shellform.output.pictures.colours import VIRIDIS
 from shellform.quantities import force_unit, number
 from shellform.records import words
 from shellform.records.check import UNASKED, Cell, Check, Subject
-from shellform.records.summary import Summary
+from shellform.records.summary import Summary, VerdictRecord
 from shellform.records.verdict import asked, headline
 
 GENERATOR = "shellform report"  # in the page's head, so that it is known again
@@ -80,7 +80,7 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         "finished": summary.optimisation is not None,
         "verdict": run.verdict,
         "headline": headline(run.verdict),
-        "kind": "bad" if run.verdict.failed else "good" if run.verdict.holds else "open",
+        "kind": _kind(run.verdict),
         "asked": asked(run.checks, run.best),
         "answers": answers(
             run.shell,
@@ -122,6 +122,13 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         "row": best,
         **controls(viewed(run), _GRADIENT),
     }
+
+
+def _kind(verdict: VerdictRecord) -> str:
+    """How a verdict is shown: red, green, or amber, where something isn't known or asks for care."""
+    if verdict.failed:
+        return "bad"
+    return "good" if verdict.holds and not verdict.cautions else "open"
 
 
 def _largest_force(runs: Sequence[ShownRun]) -> float:
