@@ -189,6 +189,13 @@ def mass(net: Net, edge: EdgeBeam) -> float:
     return mass_per_length(edge.section) * float(lengths(net).sum())
 
 
+def rods_of_bundles(net: Net, edge: EdgeBeam | None) -> float:
+    """Length, m, of all single rods that edge beams are bundles of; 0 where they are none."""
+    if edge is None or not isinstance(edge.section, Bundle):
+        return 0.0
+    return edge.section.count * float(lengths(net).sum())
+
+
 def weight(net: Net, edge: EdgeBeam) -> Reals:
     """Load (n, 6), N, of the edge beams' own weight, half an element on each of its nodes."""
     down = np.zeros((len(net.grid.flat), 6))

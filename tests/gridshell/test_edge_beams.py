@@ -14,11 +14,13 @@ from shellform.gridshell.edge_beams import Bundle, EdgeBeam, lengths, mass, weig
 from shellform.gridshell.reactions import Reactions, Support, reactions
 from shellform.net.edges import stand
 from shellform.output.exchange.opensees import opensees_script
-from shellform.output.workshop.edge_schedule import edge_table
+from shellform.output.workshop import nesting, schedules
+from shellform.output.workshop.edge_schedule import bundled_note, edge_table
 from shellform.output.workshop.marks import Words, overlap
 from shellform.output.workshop.schedules import Built
 from shellform.output.workshop.setting_out import support_plan
 from shellform.problem.paths import follow
+from shellform.quantities import number
 from shellform.structure.answers.sensitivity import reaction_rows
 from shellform.structure.elements.sections import Material, Rectangle, isotropic
 from shellform.structure.elements.state import at_rest, moved
@@ -181,7 +183,15 @@ def test_the_schedule_of_edge_beams_is_in_equilibrium_and_names_the_rods_that_ar
         assert own[0][9] == pytest.approx(np.hypot(*forces[element][2:4]))
         at, element = at + len(line.nodes), element + last
     assert table.columns[8:] == ("design: axial force [N]", "design: bending moment [N m]")
-    assert f"{mass(shell.net, BUNDLE) / 2.0:.3g} kg" in " ".join(table.notes)
+    told = " ".join(table.notes)
+    assert f"{mass(shell.net, BUNDLE) / 2.0:.3g} kg" in told
+    single = 19.0 * lengths(shell.net)
+    assert f"{number(single[0])} m of rods" in told
+    (besides,) = bundled_note(shell)
+    assert f"{number(single.sum())} m of them are bought besides" in besides
+    assert bundled_note(replace(shell, edge=EdgeBeam(Rectangle(0.01, 0.01, GFRP)))) == ()
+    built, cutting = Built(shell, shell.design(), solved), nesting.cut(grid, stock=6.0, kerf=0.003)
+    assert schedules.rods(built, cutting).notes[-1] == schedules.bars(built, cutting).notes[-1] == besides
 
 
 def test_a_model_file_gives_the_design_with_edge_beams_again(arches, solved, tmp_path):

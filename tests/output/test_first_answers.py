@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shellform.gridshell.catalogue import label
-from shellform.gridshell.edge_beams import EdgeBeam
+from shellform.gridshell.edge_beams import Bundle, EdgeBeam
 from shellform.gridshell.layers import TwoLayers
 from shellform.output.page import first_answers
 from shellform.output.page.first_answers import answers
@@ -17,7 +17,7 @@ from shellform.output.page.profile_table import profile_table
 from shellform.records.check import SLACK, Cell
 from shellform.records.profile import Profile, StageProfile, WorkRecord
 from shellform.records.raising import WayUpRecord
-from shellform.records.summary import LoadRecord, StandingRecord
+from shellform.records.summary import DocumentsRecord, LoadRecord, StandingRecord
 from shellform.records.words import standing_words
 from shellform.structure.elements.sections import Material, Rectangle
 
@@ -255,8 +255,10 @@ def shell_of(section, strength):
 
 
 @pytest.mark.parametrize("density", [460.0, 0.0])
-@pytest.mark.parametrize("layers", [1, 2])
-def test_what_to_buy_is_told_in_metres_and_kilograms_of_both_laths(monkeypatch, density, layers):
+@pytest.mark.parametrize(("layers", "spliced"), [(1, ()), (2, (0, 2))])
+def test_what_to_buy_is_told_in_bars_metres_and_kilograms_of_both_laths(
+    monkeypatch, density, layers, spliced
+):
     """9.75 m of rods of 50 × 35 mm: 0.805 kg/m a lath."""
     lath = Rectangle(0.050, 0.035, Material(12e9, 0.75e9, density, 24e6))
     shell = shell_of(TwoLayers(lath) if layers == 2 else lath, 24e6)
@@ -270,7 +272,7 @@ def test_what_to_buy_is_told_in_metres_and_kilograms_of_both_laths(monkeypatch, 
                 ways_up=None,
             )
         },
-        documents=SimpleNamespace(cut_lengths=2),
+        documents=DocumentsRecord("best", 6.0, 2, 2, 0.1, spliced, (), cut_lengths=2),
     )
     monkeypatch.setattr(first_answers, "shape_notes", lambda *_: [])
     far, many, which, buy = answers(
@@ -295,7 +297,8 @@ def test_what_to_buy_is_told_in_metres_and_kilograms_of_both_laths(monkeypatch, 
     length, mass = ("9.75 m of rod", "7.85 kg") if layers == 1 else ("19.5 m of laths, two a rod", "15.7 kg")
     assert buy.words == length + (f" ({mass})" if density else "")
     assert buy.detail == (
-        "3 rods, 5 connectors, 4 supports, 3 cables of 4.75 m in all, cut to 2 different lengths"
+        f"3 rods from 2 bars of 6 m{', 2 of them spliced' if spliced else ''}, 5 connectors, 4 supports, 3 cables of 4.75 m in all, "
+        "cut to 2 different lengths"
     )
 
 
@@ -311,6 +314,20 @@ def test_edge_beams_are_bought_too(density, told):
     none = SimpleNamespace(designs={}, documents=None)
     *_, buy = answers(shell, "best", SimpleNamespace(radius=0.02), {}, none)
     assert buy.detail.endswith(f"4.75 m in all, 2 edge beams of 3 m in all{told}, {label(steel)}")
+
+
+def test_the_rods_of_edge_beams_that_are_bundles_are_bought_besides():
+    """19 rods of 2 and of 1 m: more than the grid's own 9.75 m."""
+    shell = shell_of(Rectangle(0.05, 0.035, Material(12e9, 0.75e9)), 24e6)
+    place = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0]])
+    shell.net.edges = tuple(SimpleNamespace(ends=np.array(ends)) for ends in ([(0, 1), (1, 2)], [(2, 3)]))
+    shell.net.target = SimpleNamespace(positions=place)
+    shell.edge = EdgeBeam(Bundle(0.0225, 19, 0.5, Material(40e9, 4.5e9)))
+    other = DocumentsRecord("another", 6.0, 2, 2, 0.1, (), ())
+    none = SimpleNamespace(designs={}, documents=other)
+    *_, buy = answers(shell, "best", SimpleNamespace(radius=0.02), {}, none)
+    assert buy.detail.endswith("2 edge beams of 3 m in all, bundles of 19 rods ⌀ 45 mm: 57 m of rods besides")
+    assert buy.detail.startswith("3 rods, 5 connectors"), "of another design's bars nothing"
 
 
 def test_nothing_is_told_of_a_design_that_was_not_examined_and_no_share_of_an_unknown_strength():

@@ -21,7 +21,7 @@ from shellform.output.page.first_answers import answers
 from shellform.output.page.shown_run import ShownRun
 from shellform.quantities import number
 from shellform.records.check import Cell, Check
-from shellform.records.summary import BuiltShapeRecord, StandingRecord, VerdictRecord
+from shellform.records.summary import BuiltShapeRecord, DocumentsRecord, StandingRecord, VerdictRecord
 from shellform.records.words import constraint_titles
 from shellform.structure.elements.state import State
 from tests.net.edge_shells import barrel
@@ -313,6 +313,15 @@ def test_a_check_that_holds_and_asks_for_care_is_amber(shell, vault):
     assert (
         '<span class="mark open">✓<span class="spoken"> pass, with a caution</span></span> 200 of 200' in text
     )
+
+
+def test_what_the_workshop_has_to_know_is_among_the_notes_of_the_page(shell, vault):
+    run = run_of(shell, vault, shell.design(), shell.target)
+    spliced = "44 rods are longer than the stock and must be SPLICED"
+    documents = DocumentsRecord("initial", 6.0, 90, 90, 0.1, (1, 2), ("90 bars of 6 m.", spliced))
+    text = report.html([replace(run, summary=replace(run.summary, documents=documents))], {"shellform": "0"})
+    assert f"<li>{spliced}</li>" in text
+    assert "rods from 90 bars of 6 m, 2 of them spliced" in text
 
 
 @pytest.mark.parametrize(("times", "unit"), [(1.0, "N"), (1e3, "kN")])

@@ -614,7 +614,9 @@ def test_a_rod_s_line_tells_its_mass_its_bars_and_its_parts(density, layers):
     )
     rod = SimpleNamespace(resized=lambda radius: SimpleNamespace(section=section) if radius == 0.02 else None)
     built = SimpleNamespace(
-        shell=SimpleNamespace(rod=rod), design=SimpleNamespace(radius=0.02), grid=SimpleNamespace(rods=rods)
+        shell=SimpleNamespace(rod=rod, net=None, edge=None),
+        design=SimpleNamespace(radius=0.02),
+        grid=SimpleNamespace(rods=rods),
     )
     pieces = [
         [nesting.Piece(1, 2, 2, 5.0, 2.0), nesting.Piece(0, 1, 1, 0.0, 3.0)],

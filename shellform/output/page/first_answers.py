@@ -12,14 +12,14 @@ import numpy as np
 
 from shellform.errors import how_many
 from shellform.gridshell.catalogue import label
-from shellform.gridshell.edge_beams import lengths, mass
+from shellform.gridshell.edge_beams import lengths, mass, rods_of_bundles
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.quantities import newtons, number
 from shellform.records.check import SLACK, Cell
 from shellform.records.raising import WayUpRecord, easiest
-from shellform.records.summary import LoadRecord, Summary
+from shellform.records.summary import DocumentsRecord, LoadRecord, Summary
 from shellform.records.words import (
     above_words,
     confidence_words,
@@ -116,21 +116,31 @@ def answers(
         Answer(
             "What to buy?",
             f"{number(laths * float(rods.sum()))} m of {'rod' if laths == 1 else 'laths, two a rod'}{weight}",
-            f"{len(rods)} rods, {len(shell.net.grid.lattice)} connectors, {len(shell.net.supports)} supports, "
+            f"{len(rods)} rods{_bars(summary.documents, name)}, {len(shell.net.grid.lattice)} connectors, {len(shell.net.supports)} supports, "
             f"{how_many(len(cables.ends), 'cable', 'cables')} of {number(float(cables.rest_length.sum()))} m in all{cut}{_beams(shell)}",
         )
     )
     return found
 
 
+def _bars(documents: DocumentsRecord | None, name: str) -> str:
+    """Of how many bars the design's rods are cut, and how many have to be spliced for that."""
+    if documents is None or documents.design != name:
+        return ""
+    spliced = f", {len(documents.spliced)} of them spliced" if documents.spliced else ""
+    return f" from {how_many(documents.bars, 'bar', 'bars')} of {number(documents.stock_length)} m{spliced}"
+
+
 def _beams(shell: Gridshell) -> str:
-    """The edge beams to buy, which may be heavier than all rods."""
+    """The edge beams to buy, which may be heavier than all rods; as bundles they take rods besides."""
     if shell.edge is None:
         return ""
+    bundled = rods_of_bundles(shell.net, shell.edge)
     heavy = mass(shell.net, shell.edge)
     length, weight = number(float(lengths(shell.net).sum())), f" ({number(heavy)} kg)" if heavy > 0.0 else ""
     count = how_many(len(shell.net.edges), "edge beam", "edge beams")
-    return f", {count} of {length} m in all{weight}, {label(shell.edge.section)}"
+    of = f"bundles of {label(shell.edge.section)}: {number(bundled)} m of rods besides" if bundled else ""
+    return f", {count} of {length} m in all{weight}, {of or label(shell.edge.section)}"
 
 
 def _before(before: LoadRecord | None, force_max: float | None) -> str:

@@ -107,6 +107,7 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
             *run.notes,
             *(() if summary.net is None else summary.net.notes),
             *(() if summary.surface is None else summary.surface.mended),
+            *(() if summary.documents is None else summary.documents.notes),
         ],
         "settings": run.settings,
         "files": _folders(run.files, run.home),

@@ -8,7 +8,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.gridshell.catalogue import label
-from shellform.gridshell.edge_beams import EDGE, lengths
+from shellform.gridshell.edge_beams import EDGE, Bundle, lengths, rods_of_bundles
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.net import EdgeLine, Net
 from shellform.quantities import number
@@ -58,11 +58,22 @@ def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], ro
     notes = tuple(
         f"{name}: {label(edge.section)}, E {edge.section.material.young / 1e9:.4g} GPa, {length:.3f} m{', closed' if line.closed else ''}"
         + (f", {number(mass_per_length(edge.section) * length)} kg" if edge.section.material.density else "")
+        + (f", {number(edge.section.count * length)} m of rods" if isinstance(edge.section, Bundle) else "")
         + ". It is made in its final curve, and rods are clamped to it once they are bent."
         for name, line, length in zip(edge_names(net), net.edges, lengths(net), strict=True)
         if edge is not None
     )
     return Table("edge_beams", tuple(heads), tuple(rows), notes)
+
+
+def bundled_note(shell: Gridshell) -> tuple[str, ...]:
+    """That the rods of edge beams are bought besides, a sentence; nothing where edge beams are no bundles."""
+    bundled = rods_of_bundles(shell.net, shell.edge)
+    if not bundled:
+        return ()
+    return (
+        f"The edge beams' own rods are not among these: {number(bundled)} m of them are bought besides (edge_beams.csv).",
+    )
 
 
 def _clamped(line: EdgeLine, place: Reals, ends: Mapping[int, str]) -> dict[int, str]:

@@ -43,7 +43,7 @@ from shellform.net.grid import Grid, rod_names
 from shellform.output.workshop.block_schedule import block_table
 from shellform.output.workshop.cable_forces import force_notes
 from shellform.output.workshop.directions import away, turning_note
-from shellform.output.workshop.edge_schedule import edge_table
+from shellform.output.workshop.edge_schedule import bundled_note, edge_table
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.splice_schedule import cutting_notes, lath_names, splice_table
 from shellform.output.workshop.turnbuckles import cutting_note, turnbuckle_notes
@@ -134,7 +134,7 @@ def rods(built: Built, cutting: Cutting) -> Table:
         "rod", "direction", "length [m]", "section", "mass [kg]", "crossings",
         "marks from the first end [mm]", "crossing numbers", "bars", "note",
     )  # fmt: skip
-    notes = cutting_notes(cutting, rod_names(built.grid))
+    notes = (*cutting_notes(cutting, rod_names(built.grid)), *bundled_note(built.shell))
     if layers_of(section) == 2:
         notes += ("Each rod is two laths of that length; masses are of both, without shear blocks.",)
     if not weight:
@@ -180,7 +180,7 @@ def bars(built: Built, cutting: Cutting) -> Table:
         "bar", "piece", "rod", "part", "length [m]", "begins on the bar at [m]",
         "begins on the rod at [m]", "offcut [m]",
     )  # fmt: skip
-    return Table("bars", heads, tuple(rows), cutting_notes(cutting, names))
+    return Table("bars", heads, tuple(rows), (*cutting_notes(cutting, names), *bundled_note(built.shell)))
 
 
 def rounds(shell: Gridshell, design: Design) -> Indices:
