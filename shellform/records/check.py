@@ -12,6 +12,7 @@ from enum import Enum, auto
 from shellform.quantities import newtons, number
 
 SLACK = 1e-3  # of a limit: what the optimiser itself lets pass
+_FINER = 4  # digits, that tell what is farther off than that from the limit
 
 
 @dataclass(frozen=True)
@@ -61,19 +62,25 @@ def share_of(value: float, remedy: str = "") -> Cell:
     """A value over its limit."""
     if not math.isfinite(value):
         return UNKNOWN
-    return Cell(f"{100.0 * value:.0f} %", value <= 1.0 + SLACK, remedy=remedy)
+    holds, told = value <= 1.0 + SLACK, f"{100.0 * value:.0f}"
+    if not holds and told == "100":  # which is what it may be
+        told = number(100.0 * value, _FINER)
+    return Cell(f"{told} %", holds, remedy=remedy)
 
 
-def quantity(value: float, unit: str) -> str:
+def quantity(value: float, unit: str, digits: int = 3) -> str:
     """A value with its unit, a force in the unit in which it is read."""
-    return newtons(value) if unit == "N" else f"{number(value)} {unit}"
+    return newtons(value, digits) if unit == "N" else f"{number(value, digits)} {unit}"
 
 
 def below(value: float | None, limit: float, unit: str, remedy: str = "") -> Cell:
     """A value that mustn't exceed its limit."""
     if value is None or not math.isfinite(value):
         return UNKNOWN
-    return Cell(quantity(value, unit), value <= limit * (1.0 + SLACK), remedy=remedy)
+    holds, told = value <= limit * (1.0 + SLACK), quantity(value, unit)
+    if not holds and told == quantity(limit, unit):  # which is what it may be
+        told = quantity(value, unit, _FINER)
+    return Cell(told, holds, remedy=remedy)
 
 
 def on_worse_mesh(value: float, error: float | None) -> float:

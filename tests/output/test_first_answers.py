@@ -149,7 +149,7 @@ def test_the_load_of_collapse_is_told_as_far_as_it_is_known(factor, kind, error,
 
 def test_the_error_of_a_collapse_load_is_told_without_its_sign():
     row = replace(MORE, critical_factor=2.5, critical_kind="limit point", critical_factor_error=-0.0312)
-    assert first_answers._collapse(row).endswith(", off by 0.031.")
+    assert first_answers._collapse(row).endswith(", by the mesh off by 0.031.")
     assert "off by" not in first_answers._collapse(replace(row, critical_factor_error=None))
 
 

@@ -107,7 +107,10 @@ def test_the_answers_are_numbers_of_the_design(shell, designs):
     assert "No more are asked for. As planned" in answer.detail
     assert "isn't known" in found["Is it safe at 1.2 × the load?"].detail
     for known, words in [
-        ({"critical_factor": 1.85, "critical_kind": "limit point"}, "ends at 1.850 × (limit point)"),
+        (
+            {"critical_factor": 1.85, "critical_kind": "limit point"},
+            "ends at 1.850 × the design load (limit point)",
+        ),
         ({"critical_factor": 3.0, "critical_kind": "none"}, "up to 3 ×"),
     ]:
         sought = summary(designs, "design", **known)

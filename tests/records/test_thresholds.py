@@ -45,6 +45,17 @@ def found(shell, designs, *changed, bounds=BOUNDS, **changes):
     return {check.name: check.cells["polished"] for check in made}
 
 
+def test_what_is_beyond_its_limit_is_never_told_as_the_limit_itself():
+    """100.19 % of the strength failed as "100 %", where up to 100 % is asked for."""
+    told = {share: share_of(share).found for share in (0.9996, 1.0009, 1.0011, 1.0019, 1.006)}
+    assert told == {0.9996: "100 %", 1.0009: "100 %", 1.0011: "100.1 %", 1.0019: "100.2 %", 1.006: "101 %"}
+    assert below(20.03, 20.0, "N").found == "20.03 N"
+    assert below(20.01, 20.0, "N").found == "20 N", "which counts as kept"
+    assert below(26460.0, 26400.0, "N").found == "26.5 kN"
+    assert below(26430.0, 26400.0, "N").found == "26.43 kN"
+    assert below(300.4, 300.0, "mm").found == "300.4 mm"
+
+
 def test_a_limit_is_passed_by_a_thousandth_and_no_more():
     assert SLACK == 1e-3
     assert share_of(1.0009).holds

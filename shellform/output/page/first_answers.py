@@ -23,7 +23,6 @@ from shellform.records.summary import DocumentsRecord, LoadRecord, Summary
 from shellform.records.words import (
     above_words,
     confidence_words,
-    critical_words,
     driven_words,
     listed,
     load_title,
@@ -263,8 +262,12 @@ def _collapse(row: LoadRecord | None) -> str:
         return "At which load it collapses isn't known."
     if row.critical_kind == "none":
         return f"Stable up to {row.critical_factor:.3g} × the design load, the most that was tried."
-    off = "" if row.critical_factor_error is None else f", off by {abs(row.critical_factor_error):.3f}"
-    return f"The perfect shell's stability ends at {critical_words(row.critical_factor, row.critical_kind)}{off}."
+    off = (
+        ""
+        if row.critical_factor_error is None
+        else f", by the mesh off by {abs(row.critical_factor_error):.3f}"
+    )
+    return f"The perfect shell's stability ends at {row.critical_factor:.3f} × the design load ({row.critical_kind}){off}."
 
 
 def _mm(metres: float) -> str:
