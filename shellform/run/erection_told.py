@@ -9,6 +9,7 @@ from shellform.run.folder import Run
 from shellform.site.erection_steps import Props
 from shellform.structure.elements.state import State
 
+_NOTHING = 1e-6  # m: so near a shell lies where its design does
 EVERY = "every"  # crossing is propped, as it is asked for
 
 
@@ -20,6 +21,8 @@ def off_design(run: Run, design: str, load: str, state: State) -> list[str]:
         return []
     far = float(np.linalg.norm(state.positions - known.positions, axis=1).max())
     under = "before any load" if load == "none" else f"under the load “{load}”"
+    if far < _NOTHING:
+        return [f"in the end it lies where the design does {under}"]
     return [f"in the end it lies up to {number(1e3 * far, 2)} mm from where the design does {under}"]
 
 

@@ -267,7 +267,7 @@ def erect(
         [
             *counted,
             f"{len(done.steps)} steps: {', '.join(dict.fromkeys(each.stage for each in done.steps))}",
-            f"largest rod stress {1e-6 * worst.stress:.0f} MPa, {worst.stress / done.strength:.2f} of the "
+            f"largest rod stress {1e-6 * worst.stress:.0f} MPa, {worst.stress / done.strength:.3f} of the "
             f"strength, at {worst.share:.2f} of {worst.stage}; "
             f"{1e-6 * last.stress:.0f} MPa in the end",
             f"largest cable tension {newtons(max(each.tension for each in done.steps))}, largest force on a "

@@ -10,6 +10,7 @@ import pytest
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design
 from shellform.run import onsite
+from shellform.run.erection_told import off_design
 from shellform.run.onsite import Survey
 from shellform.run.site_sources import Scanned, design_named, load_named
 from shellform.site.erection_steps import Props
@@ -125,6 +126,16 @@ def test_a_replay_tells_what_is_left_after_each_round_and_draws_lengths_of_the_e
     )  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("off", "told"),
+    [(4.4e-13, "where the design does before"), (2e-6, "up to 0.002 mm from where the design does")],
+)
+def test_a_shell_that_ends_where_its_design_lies_is_told_so_without_a_number(off, told):
+    own = SimpleNamespace(states={"polished": {"none": STATE}})
+    (line,) = off_design(own, "polished", "none", moved([0.0, 0.0, off]))
+    assert line.startswith(f"in the end it lies {told}")
+
+
 def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, run, tmp_path):
     def step(stage, share, stress, tension, reaction):
         return SimpleNamespace(
@@ -147,7 +158,7 @@ def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, 
     assert asked == [("last", "concrete", None, "no load", 0.125)]
     assert list(found.lines) == [
         "3 steps: moving, loading",
-        "largest rod stress 120 MPa, 0.50 of the strength, at 1.00 of moving; 60 MPa in the end",
+        "largest rod stress 120 MPa, 0.500 of the strength, at 1.00 of moving; 60 MPa in the end",
         "largest cable tension 7.5 N, largest force on a support 40 N",
         "in the end it lies up to 20 mm from where the design does under the load “wet”",
     ]
