@@ -465,6 +465,15 @@ def test_the_plan_of_supports_tells_how_long_and_wide_the_shell_is(built):
         assert span.base[1 - axis] < low[1 - axis]
 
 
+def test_levels_of_supports_are_said_to_be_those_of_axes_where_they_are_given(built):
+    """Of a cap of 15 m they lie 14 mm below the surface's ground to 18 mm above it, in two layers of rods."""
+    level = 1e3 * built.shell.target.positions[built.shell.net.supports, 2]
+    sheet, table = setting_out.support_plan(built), schedules.supports(built)
+    assert [row[4] for row in sheet.rows] == [f"{z:.1f}" for z in level.tolist()]
+    assert "z is the axis' level, not the ground's" in sheet.notes[0]
+    assert "x, y and z are those of the axis that ends there" in table.notes[0]
+
+
 def test_supports_that_stand_too_near_for_their_shoes_are_named(built):
     found = schedules.clashing_supports(built)
     feet = built.shell.target.positions[built.shell.net.supports]

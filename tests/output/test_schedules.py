@@ -558,10 +558,10 @@ def test_supports_lead_along_the_tangents_of_rods_and_of_edge_beams_at_their_fee
     assert table.columns[9:] == tuple(
         f"{name}: on the support along {axis} [N]" for name in ("erected", "design") for axis in "xyz"
     )
-    assert table.notes[2] == "From these directions rods turn in their supports: erected up to 0.0° (S1)."
-    assert "nearer than 30 mm" in table.notes[3]
-    assert table.notes[3].endswith("clash: S0 and S1, 12.5 mm, S1 and S2, 20.0 mm.")
-    assert table.notes[4:] == ("from there",)
+    assert table.notes[3] == "From these directions rods turn in their supports: erected up to 0.0° (S1)."
+    assert "nearer than 30 mm" in table.notes[4]
+    assert table.notes[4].endswith("clash: S0 and S1, 12.5 mm, S1 and S2, 20.0 mm.")
+    assert table.notes[5:] == ("from there",)
 
 
 def test_an_edge_beam_s_first_foot_leads_along_the_beam(monkeypatch):
@@ -597,7 +597,7 @@ def test_an_edge_beam_s_first_foot_leads_along_the_beam(monkeypatch):
         1.0,
         1.0,
     )
-    assert table.notes[2].endswith("clash: none.")
+    assert table.notes[3].endswith("clash: none.")
 
 
 @pytest.mark.parametrize("density", [460.0, 0.0])

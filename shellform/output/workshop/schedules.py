@@ -315,6 +315,7 @@ def supports(built: Built) -> Table:
     ]  # fmt: skip
     heads += [f"{_stage(name)}: on the support along {axis} [N]" for name in pushes for axis in "xyz"]
     notes = (
+        "x, y and z are those of the axis that ends there, a rod's or an edge beam's, not of the ground under it.",
         "Supports stand where they are: before, during and after the pour. Forces are those of the rods' ends on them, "
         "at the feet of edge beams (E0, E1, …) those of the beams, with the load that stands on the support itself.",
         "Bearing, from x towards y, and rise are those of the axis' tangent at the support in the wanted shape; of beams that meet "

@@ -79,7 +79,7 @@ def support_plan(built: Built) -> Sheet:
             Words("DIMENSIONS", (x + 0.1 * s, y + 0.1 * s), 0.14 * s, f"x, y = {text}"),
         ]
     notes = (
-        "Supports are where the rods' axes meet the ground; rods stand as on the target.",
+        "Supports are where the axes of rods and edge beams end; z is the axis' level, not the ground's under it. Rods stand as on the target.",
         "Directions of the rods at the supports: schedules/supports.csv. Survey targets: "
         "schedules/survey.csv.",
         *built.origin_notes,
