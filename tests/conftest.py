@@ -1,5 +1,6 @@
 """The paper-scale vault, pulled and braced once for all tests."""
 
+import gc
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,18 @@ from shellform.structure.elements.state import State
 from tests.run.small_run import begin
 
 ROOT = Path(__file__).parent.parent
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collected without searches for garbage, of which there is none; nor do later ones go through what was
+    collected, which stays until the end."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture(scope="session")
