@@ -1,6 +1,7 @@
 """The paper-scale vault, pulled and braced once for all tests."""
 
 import gc
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,13 @@ def pytest_collection():
     finally:
         gc.freeze()
         gc.enable()
+
+
+def pytest_collection_modifyitems(items):
+    """Files of few tests first, whole runs among them: what is handed out last is over in a moment, and no
+    process waits for the other's (scripts/test)."""
+    count = Counter(item.path for item in items)
+    items.sort(key=lambda item: count[item.path])
 
 
 @pytest.fixture(scope="session")

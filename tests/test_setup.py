@@ -1,10 +1,14 @@
-"""The scripts' set-up installs what is locked, and says so where it can't."""
+"""The scripts' set-up installs what is locked, and says so where it can't; tests come in the order in which
+no process waits for another."""
 
 import os
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+
+from tests.conftest import pytest_collection_modifyitems
 
 SETUP = Path(__file__).parent.parent / "scripts/setup"
 # In place of a virtual environment's Python: notes what it is asked for, and lets the locked install fail as
@@ -67,3 +71,10 @@ def test_where_the_lock_does_not_fit_the_bounds_are_installed_and_that_is_said(s
     assert "No matching distribution" in done.stderr
     assert "what pyproject.toml's bounds allow" in done.stderr
     assert calls[-1].endswith("[all]")
+
+
+def test_files_of_few_tests_come_before_those_of_many_and_each_stays_whole():
+    items = [SimpleNamespace(path=path, number=k) for k, path in enumerate("aaaabbccd")]
+    pytest_collection_modifyitems(items)
+    assert "".join(each.path for each in items) == "dbbccaaaa"
+    assert [each.number for each in items if each.path == "a"] == [0, 1, 2, 3]
