@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import shellform as sf
 from shellform.errors import InputError, NotConverged
 from shellform.site import calibration
 from shellform.site.calibration import calibrate, foresee
 from shellform.site.identifiability import TELLABLE
 from shellform.site.scans import Scan, laid, match, read_points
+from tests.conftest import braced
 
 NOISE = 0.15e-3
 
@@ -18,6 +20,13 @@ NOISE = 0.15e-3
 def on_part(chosen, load, total):
     part = np.where(chosen[:, None], load, 0.0)
     return part * (total / np.abs(part).sum())
+
+
+@pytest.fixture(scope="module")
+def shell(vault):
+    """With two elements a segment: scans and fits are of the same ones."""
+    net = sf.pull_net(vault, spacing=0.055, gap=0.002, angle=np.deg2rad(45.0), elements=2)
+    return braced(net, vault)
 
 
 @pytest.fixture(scope="module")
