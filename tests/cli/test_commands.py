@@ -419,7 +419,9 @@ def test_a_design_that_does_not_hold_ends_with_status_3_and_has_its_page(tmp_pat
         "safety.drawn=4",
         "safety.compared=2",
         "safety.critical_factor=9.0",
+        "cable.without=false",
         "optimise.unloaded=false",
+        "optimise.evaluations=1",
     ):
         arguments += ["--set", setting]
     result = shellform(*arguments)

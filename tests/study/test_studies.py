@@ -366,8 +366,7 @@ def test_a_study_killed_in_the_middle_goes_on_and_ends_with_the_same_bytes(tmp_p
     job.wait()
     killed = (out / "results.jsonl").read_bytes().count(b"\n")
     assert killed < 40
-    job = study_process(file, out, "slow")
-    assert job.wait(120) == 0
+    run_study(file, out, work=slow)
     keys = [line.split(b'"')[3] for line in (out / "results.jsonl").read_bytes().splitlines()]
     assert len(keys) == len(set(keys)) == 40
     # Four were handed out at the kill, at the most; nothing else was done twice.
