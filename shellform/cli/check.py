@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from shellform.cli.options import Json, Scripts, with_surface_options
-from shellform.cli.terminal import tell_labelled
+from shellform.cli.terminal import Spinner, tell_labelled
+from shellform.records.progress import Event
 
 
 @with_surface_options
@@ -23,7 +24,9 @@ def check(
     """Read a surface or case and report what it is."""
     from shellform.run.first_look import check_file, labelled
 
-    found = check_file(file, surface_options, allow_scripts=allow_scripts)
+    with Spinner() as report:
+        report(Event("check", f"reading {file.name}"))
+        found = check_file(file, surface_options, allow_scripts=allow_scripts)
     if as_json:
         print(json.dumps(found.document(), indent=1))
     else:

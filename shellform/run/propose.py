@@ -121,6 +121,7 @@ def _read(asked: _Asked, file: Path, options: Mapping[str, Any]) -> _Ready:
     """The surface in a file, counted from near where it is far away, on plinths where it flares into the
     ground."""
     told: tuple[str, ...] = ()
+    asked.report(Event("surface", f"reading {file.name}"))
     surface = surface_of(surface_entry(file, options), allow_scripts=asked.allow_scripts)
     for mended in surface.mended:
         asked.report(Event("surface", mended, Kind.NOTE))

@@ -17,6 +17,7 @@ its bisector.
 from __future__ import annotations
 
 import math
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -44,6 +45,7 @@ _BUILT_EDGES = 90.0  # along the largest dimension of a builder script
 _SAMPLES = 33  # points on each edge curve that a fitted surface passes through
 _FITTED = 1000  # about as many vertices a fitted surface passes through
 _SEGMENTS = 100  # of a fitted B-spline along u and v
+_TOGETHER = 200  # patches that are made in one model
 _CORNER = np.cos(np.deg2rad(30.0))  # an edge that turns more has a corner there
 _IGES_UNITS = 1000.0  # gmsh states millimetres in IGES files and leaves the numbers as they are
 
@@ -135,9 +137,7 @@ def read_cad(
 def mesh_patches(patches: Sequence[Patch], where: Path, meshing: Meshing) -> Draft:
     """NURBS patches, m, trimmed and sewn where they touch, meshed as CAD files are."""
     with session(), errors(where, "gmsh can't build its surfaces", "Export it as STEP, or as a mesh."):
-        for patch in patches:
-            _add_patch(patch)
-        gmsh.model.occ.synchronize()
+        _add_patches(patches)
         sew()
         return _draft(where, meshing)
 
@@ -188,6 +188,27 @@ def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[
     across = (first - begin)[:, 0] * (second - begin)[:, 1] - (first - begin)[:, 1] * (second - begin)[:, 0]
     triangles[across < 0.0] = triangles[across < 0.0][:, ::-1]
     return places[inside], triangles
+
+
+def _add_patches(patches: Sequence[Patch]) -> None:
+    """The patches as faces of the current model. Many are made in models of their own and brought together by
+    files: how long gmsh looks for what a face was made with, to take it away, grows with what is there."""
+    groups = [patches[k : k + _TOGETHER] for k in range(0, len(patches), _TOGETHER)]
+    with tempfile.TemporaryDirectory() as folder:
+        files = [str(Path(folder) / f"{number}.brep") for number in range(len(groups))]
+        for file, group in zip(files, groups, strict=True):
+            for patch in group:
+                _add_patch(patch)
+            gmsh.model.occ.synchronize()
+            if len(groups) > 1:
+                with silence():
+                    gmsh.write(file)
+                gmsh.model.remove()
+                gmsh.model.add("surface")
+        for file in files if len(groups) > 1 else ():
+            with silence():
+                gmsh.model.occ.importShapes(file, format="brep")
+        gmsh.model.occ.synchronize()
 
 
 def _add_patch(patch: Patch) -> None:

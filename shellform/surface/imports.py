@@ -10,6 +10,7 @@ from pathlib import Path
 
 from shellform.errors import InputError, how_many
 from shellform.surface.occ import extent, gmsh, silence, to_sew
+from shellform.surface.readers.draft import MOST_SOLIDS
 
 # of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
 _SEWN = 1e-6
@@ -19,12 +20,19 @@ def import_faces(file: Path, kind: str, face: str | None) -> tuple[str, ...]:
     """Brings the faces of a "step", "iges" or "brep" file into the current model, STEP in mm, IGES in m,
     those that touch sewn together, and returns a sentence where solids were left out.
 
-    Raises InputError where there are no faces, for solids alone without a `face`, and for solids beside
-    surfaces with one.
+    Raises InputError where there are no faces, for solids alone without a `face`, or more than hang together,
+    and for solids beside surfaces with one.
     """
     _read_shapes(file, kind)
     left_out = _surfaces_beside_solids(file, kind, face) if gmsh.model.getEntities(3) else ()
-    if gmsh.model.getEntities(3) and face is None:
+    solids = len(gmsh.model.getEntities(3))
+    if solids > MOST_SOLIDS:
+        raise InputError(
+            f"holds {solids} solids, which make no one skin",
+            where=str(file),
+            remedy="Export the surface that they make, such as their upper faces joined, without the solids.",
+        )
+    if solids and face is None:
         remedy = (
             "Choose its upper or lower face (surface.face, --face), or export that face alone, as a surface."
         )

@@ -112,6 +112,13 @@ def test_check_tells_size_area_and_counts():
     assert "crossings to expect" in result.stdout
 
 
+def test_check_shows_on_a_terminal_what_it_reads(monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # which makes a terminal of any stream
+    result = shellform("check", "scripts/scale_model.toml")
+    assert "reading scale_model.toml" in result.stderr
+    assert "reading" not in result.stdout
+
+
 def test_bad_surfaces_and_cases_are_refused_without_a_traceback(tmp_path):
     refused(shellform("check", tmp_path / "none.obj"), "no such file")
     case = tmp_path / "case.toml"

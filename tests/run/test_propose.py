@@ -116,13 +116,14 @@ def test_a_proposed_case_loads_and_its_initial_design_stands_under_both_loads_as
     assert all(each.on_branch for each in found.values())
 
 
-def test_new_tells_once_what_was_mended_in_the_file(tmp_path):
+def test_new_tells_what_it_reads_and_once_what_was_mended_in_it(tmp_path):
     file, heard = tmp_path / "flat.obj", []
     lines = ["v 0 0 0", "v 4 0 0", "v 4 4 0", "v 0 4 0", "v 9 9 9", "f 1 2 3", "f 1 3 4"]
     file.write_text("\n".join(lines), encoding="utf-8")
     with pytest.raises(InputError, match="keeps to a plane"):
         propose_case(file, tmp_path / "flat.toml", {}, allow_scripts=False, report=heard.append)
     assert [each.text for each in heard if "no face" in each.text] == ["1 point of no face was dropped"]
+    assert heard[0].text == "reading flat.obj"
 
 
 def test_a_proposed_case_says_why_and_what_its_edges_stand_on(proposed):

@@ -293,6 +293,10 @@ def test_files_that_hold_no_open_surface_are_refused_with_what_to_do(tmp_path):
     cad.write_cad(tmp_path / "box.step", script(tmp_path, box))
     with pytest.raises(InputError, match=r"holds a solid\. Choose its upper or lower face"):
         cad.import_surface(tmp_path / "box.step")
+    many = "def build(gmsh, *, side=1.0):\n  for k in range(51): gmsh.model.occ.addBox(2 * k, 0, 0, side, side, side)\n"
+    cad.write_cad(tmp_path / "boxes.step", script(tmp_path, many))
+    with pytest.raises(InputError, match=r"holds 51 solids, which make no one skin\. Export the surface"):
+        cad.import_surface(tmp_path / "boxes.step")
     edge = "def build(gmsh, *, side=1.0): gmsh.model.occ.addCircle(0, 0, 0, side)\n"
     cad.write_cad(tmp_path / "edge.brep", script(tmp_path, edge))
     with pytest.raises(InputError, match="holds no surface, only points or curves"):

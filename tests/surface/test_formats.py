@@ -24,7 +24,7 @@ from shellform.surface.readers.meshes import write_mesh
 from shellform.surface.readers.network_faces import faces_in_plan
 from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.plain import read_obj
-from shellform.surface.readers.reading import read_surface
+from shellform.surface.readers.reading import read_surface, surface_of
 from tests.surface.brought import rhino_mesh
 from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl, y_up
 
@@ -486,6 +486,71 @@ def test_a_rhino_sphere_is_closed_and_refused(tmp_path):
     ):
         with pytest.raises(InputError, match=said):
             read_surface(file, size=0.2, face=face)
+
+
+def box(x):
+    return rhino3dm.Brep.CreateFromBox(rhino3dm.Box(rhino3dm.BoundingBox(x, 0.0, 0.0, x + 0.6, 0.5, 0.3)))
+
+
+def test_a_stack_of_blocks_is_refused_before_their_faces_are_built_and_a_surface_beside_them_is_read(
+    tmp_path,
+):
+    blocks = [(box(float(k)), "Blocks", f"stone {k}") for k in range(51)]
+    file = rhino_file(tmp_path / "a.3dm", blocks, "Meters")
+    with pytest.raises(InputError, match=r"holds 51 closed solids.*choose one of them by surface.object"):
+        read_surface(file)
+    with pytest.raises(InputError, match="is closed"):
+        read_surface(file, name="stone 7", size=0.2)
+    file = rhino_file(tmp_path / "b.3dm", [*blocks, (nurbs_cap(), "Shell", "roof")], "Meters")
+    with pytest.raises(InputError, match=r"beside 1 surface.*choose a surface.*'roof' on layer 'Shell'"):
+        read_surface(file)
+    assert read_surface(file, layer="Shell", size=0.5).size[0] == pytest.approx(6.0, rel=1e-6)
+
+
+def test_blocks_of_one_name_are_not_offered_by_it(tmp_path):
+    file = rhino_file(tmp_path / "a.3dm", [(box(float(k)), "Blocks", "stone") for k in range(51)], "Meters")
+    with pytest.raises(InputError, match="holds 51 closed solids") as told:
+        read_surface(file)
+    assert told.value.remedy.endswith("upper faces joined, without the solids.")
+
+
+def flat_panel(x, y, side):
+    panel = rhino3dm.NurbsSurface.Create(3, False, 2, 2, 2, 2)
+    for i in range(2):
+        for j in range(2):
+            a, b = x + i * side, y + j * side
+            panel.Points[i, j] = rhino3dm.Point4d(a, b, 0.3 * a + 0.2 * b, 1.0)
+    for knots in (panel.KnotsU, panel.KnotsV):
+        knots[0], knots[1] = 0.0, 1.0
+    return panel
+
+
+def test_what_a_panel_costs_does_not_grow_with_how_many_there_are(tmp_path, monkeypatch):
+    panels = [
+        (rhino3dm.Brep.CreateFromSurface(flat_panel(float(i), float(j), 1.0)), "S", "")
+        for i in range(15)
+        for j in range(15)
+    ]
+    file = rhino_file(tmp_path / "a.3dm", panels, "Meters")
+    beside, add = [], cad._add_patch
+
+    def counted(patch):
+        beside.append(len(cad.gmsh.model.occ.getEntities()))
+        add(patch)
+
+    monkeypatch.setattr(cad, "_add_patch", counted)
+    monkeypatch.setattr(cad, "_TOGETHER", 100)
+    drawn = rhino.read_rhino(file, Choice(), Meshing(1.0), unit=None)
+    assert len(beside) == 225
+    assert max(beside) <= 99 * 9  # each with its edges and corners
+    surface = surface_of(drawn, "panels")
+    assert len(surface.boundary) == 1
+    assert surface.area == pytest.approx(225.0 * np.sqrt(1.0 + 0.3**2 + 0.2**2), rel=1e-9)
+
+
+def test_straight_sides_are_told_by_their_ends():
+    assert rhino._side_samples(flat_panel(0.0, 0.0, 1.0), 0) == 2
+    assert rhino._side_samples(nurbs_cap(), 1) == rhino._SAMPLES
 
 
 def test_rhino_s_trimmed_breps_are_trimmed(tmp_path):

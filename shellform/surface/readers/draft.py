@@ -19,6 +19,7 @@ from shellform.surface.shape.triangles import area_vectors, used_points
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000  # of one surface: they take 4 GB (allowance.py)
 MOST_BYTES = 512 * 1024**2  # of one file
+MOST_SOLIDS = 50  # of one file, whose faces are looked at: no shell hangs together of more
 _NAMES_TOLD = 12  # of layers and objects, in one message
 _COARSE = 2.0  # times a surface's larger side: no triangle of it is so large
 _TRIANGLES = 2.5  # in a square of the mesh size, with what a surface's rise adds to its plan

@@ -22,8 +22,18 @@ import numpy as np
 import rhino3dm
 
 from shellform.arrays import Indices, Reals, Record
-from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, Meshing, MeshObject, among, called, joined
+from shellform.errors import InputError, how_many
+from shellform.surface.readers.draft import (
+    MOST_SOLIDS,
+    Choice,
+    Draft,
+    Meshing,
+    MeshObject,
+    among,
+    called,
+    first_names,
+    joined,
+)
 from shellform.surface.readers.nurbs import Curve, Patch, with_end_knots
 from shellform.surface.readers.rhino_bytes import without_date_and_path
 
@@ -36,7 +46,7 @@ _OURS = UUID("5c6f4b1e-6b0e-5a53-9f0d-6a1f8b7d2c11")  # under which what is writ
 _DEEPEST = 16  # blocks within blocks
 _SUBDIVISIONS = 3  # of a SubD, each of which quarters its faces
 _ON_EDGE = 1e-4  # of the size: a trim nearer to the patch's own edge than that doesn't cut it
-_SAMPLES = 161  # along each side, whose chords are then nearer to it than that
+_SAMPLES = 161  # along each curved side, whose chords are then nearer to it than that
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +146,7 @@ def read_rhino(
         )
     kept = among([(layer, name) for layer, name, _ in found], choice, str(file))
     chosen = [each for each, meant in zip(found, kept, strict=True) if meant]
+    _refuse_many_solids(chosen, file)
     parts, patches = [], []
     for layer, name, shape in chosen:
         if isinstance(shape, rhino3dm.Mesh | rhino3dm.SubD):
@@ -155,6 +166,29 @@ def read_rhino(
 
     draft = cad.mesh_patches(patches, file, meshing)
     return replace(draft, objects=tuple(called(layer, name) for layer, name, _ in chosen))
+
+
+def _refuse_many_solids(chosen: Sequence[tuple[str, str, Any]], file: Path) -> None:
+    """Raises InputError for a stack of blocks, before minutes go into skins that never become one."""
+    solid = [
+        isinstance(shape, rhino3dm.Brep | rhino3dm.Extrusion) and shape.IsSolid for _, _, shape in chosen
+    ]
+    if sum(solid) <= MOST_SOLIDS:
+        return
+    open_ones = [each for each, closed in zip(chosen, solid, strict=True) if not closed]
+    names = list(dict.fromkeys(called(layer, name) for layer, name, _ in open_ones or chosen))
+    choose = "choose a surface" if open_ones else "choose one of them"
+    raise InputError(
+        f"holds {sum(solid)} closed solids, which make no one skin"
+        + (f", beside {how_many(len(open_ones), 'surface', 'surfaces')}" if open_ones else ""),
+        where=str(file),
+        remedy="Export the surface that they make, such as their upper faces joined, without the solids"
+        + (
+            f"; or {choose} by surface.object or surface.layer (--object, --layer): {first_names(names)}."
+            if open_ones or len(names) == len(chosen)
+            else "."
+        ),
+    )
 
 
 def _numbered(found: list[tuple[str, str, Any]]) -> list[tuple[str, str, Any]]:
@@ -298,18 +332,28 @@ def _patch(surface: Any, loops: Sequence[tuple[Curve, ...]], factor: float) -> P
 def _along_edge(surface: Any, edges: Sequence[Any]) -> bool:
     """Whether a trimming loop runs along the untrimmed surface's own edge."""
     (u0, u1), (v0, v1) = ((d.T0, d.T1) for d in (surface.Domain(0), surface.Domain(1)))
-    t = np.linspace(0.0, 1.0, _SAMPLES)
-    sides = [[(u0 + (u1 - u0) * s, v) for s in t] for v in (v0, v1)] + [
-        [(u, v0 + (v1 - v0) * s) for s in t] for u in (u0, u1)
+    across, along_u = (np.linspace(0.0, 1.0, _side_samples(surface, way)) for way in (1, 0))
+    sides = [[(u0 + (u1 - u0) * s, v) for s in along_u] for v in (v0, v1)] + [
+        [(u, v0 + (v1 - v0) * s) for s in across] for u in (u0, u1)
     ]
-    rim = np.array([[(p.X, p.Y, p.Z) for p in (surface.PointAt(u, v) for u, v in side)] for side in sides])
-    begin, along = rim[:, :-1].reshape(-1, 3), np.diff(rim, axis=1).reshape(-1, 3)
+    lines = [np.array([(p.X, p.Y, p.Z) for p in (surface.PointAt(u, v) for u, v in side)]) for side in sides]
+    rim = np.vstack(lines)
+    begin, along = (
+        np.vstack([line[:-1] for line in lines]),
+        np.vstack([np.diff(line, axis=0) for line in lines]),
+    )
     for edge in edges:
         for s in np.linspace(edge.Domain.T0, edge.Domain.T1, 9):
             point = edge.PointAt(s)
             away = np.array([point.X, point.Y, point.Z]) - begin
             share = np.sum(away * along, axis=1) / np.maximum(np.sum(along * along, axis=1), 1e-300)
             gap = np.linalg.norm(away - np.clip(share, 0.0, 1.0)[:, None] * along, axis=1).min()
-            if gap > _ON_EDGE * float(np.ptp(rim.reshape(-1, 3), axis=0).max()):
+            if gap > _ON_EDGE * float(np.ptp(rim, axis=0).max()):
                 return False
     return True
+
+
+def _side_samples(surface: Any, way: int) -> int:
+    """How many points tell where a side along u (`way` 0) or v (1) runs: its ends where that is straight, as
+    all those of flat panels are."""
+    return 2 if surface.Degree(way) == 1 and surface.SpanCount(way) == 1 else _SAMPLES
