@@ -90,6 +90,7 @@ def _read(entry: SurfaceEntry, *, allow_scripts: bool) -> Surface:
         face=entry.face,
         piece=entry.piece,
         fill=entry.fill,
+        fill_narrower=entry.fill_narrower,
         ground=entry.ground,
     )
 

@@ -11,6 +11,7 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    NonNegativeFloat,
     PositiveFloat,
     PositiveInt,
     field_validator,
@@ -66,6 +67,7 @@ class SurfaceEntry(Entry):
     face: Literal["upper", "lower"] | None = Field(None, description="face of a solid")
     piece: PositiveInt | None = Field(None, description="number of a separate piece, 1 the largest")
     fill: Literal["holes", "edges", "all"] | None = Field(None, description="openings to close")
+    fill_narrower: NonNegativeFloat = Field(0.0, description="holes narrower than this, m, are closed too")
     ground: float | None = Field(
         None, description="height to which open edges are closed, m; left out: the edge's lowest"
     )

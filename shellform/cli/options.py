@@ -20,6 +20,12 @@ Object = Annotated[str | None, typer.Option("--object", help="Name of the surfac
 Face = Annotated[str | None, typer.Option(help="Face of a solid: upper or lower.")]
 Piece = Annotated[int | None, typer.Option(help="Number of a separate piece, 1 the largest.")]
 Fill = Annotated[str | None, typer.Option(help="Openings to close: holes, edges or all.")]
+Narrower = Annotated[
+    float | None,
+    typer.Option(
+        help="Holes narrower than this, m, are closed; new closes those narrower than its spacing, 0: none."
+    ),
+]
 Ground = Annotated[float | None, typer.Option(help="Height to which open edges are closed, m.")]
 Origin = Annotated[
     tuple[float, float, float] | None,
@@ -38,6 +44,7 @@ _SURFACE = {
     "face": Face,
     "piece": Piece,
     "fill": Fill,
+    "fill_narrower": Narrower,
     "ground": Ground,
     "origin": Origin,
     "above": Above,

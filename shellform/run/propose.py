@@ -38,6 +38,7 @@ from shellform.run.first_trial import (
     FirstDesign,
     FirstParts,
 )
+from shellform.run.narrow_holes import narrow_holes
 from shellform.run.plinths import plinths_for
 from shellform.run.proposed_shape import built_deviation, optimise_table, stray_told
 from shellform.run.sizes import THICKNESS, DesignWish, RodChoice, usual_thickness
@@ -84,7 +85,7 @@ def propose_case(
     """
     _check(output)
     asked, wish = _Asked(file, output, allow_scripts, report), wish or DesignWish()
-    ready = _read(asked, file, options)
+    ready = _read(asked, file, options, wish.spacing)
     times = larger(ready.surface, wish.spacing)
     if times > 1.0:
         asked.say(f"{times:.2g} times the usual work is allowed, for so many crossings")
@@ -117,20 +118,34 @@ class _Ready:
     plinths: str
 
 
-def _read(asked: _Asked, file: Path, options: Mapping[str, Any]) -> _Ready:
-    """The surface in a file, counted from near where it is far away, on plinths where it flares into the
-    ground."""
+def _read(asked: _Asked, file: Path, options: Mapping[str, Any], spacing: float | None) -> _Ready:
+    """The surface in a file, without holes narrower than the `spacing` (None: the usual one), counted from
+    near where it is far away, on plinths where it flares into the ground."""
     told: tuple[str, ...] = ()
     asked.report(Event("surface", f"reading {file.name}"))
     surface = surface_of(surface_entry(file, options), allow_scripts=asked.allow_scripts)
+    narrow = narrow_holes(surface, file, options, spacing)
+    if narrow is not None:
+        closed = {**options, "fill_narrower": narrow.width}
+        try:
+            surface = surface_of(surface_entry(file, closed), allow_scripts=asked.allow_scripts)
+        except InputError as error:  # too steep there, or of an outline that crosses itself
+            told = (f"{narrow.kept}: {error.what}",)
+        else:
+            options, told = closed, (narrow.closed,)
     for mended in surface.mended:
         asked.report(Event("surface", mended, Kind.NOTE))
+    for sentence in told:
+        asked.say(sentence)
     origin = distant_origin(surface, FAR)
     if origin is not None:
         surface, earlier = counted_from(surface, origin), options.get("origin") or (0.0, 0.0, 0.0)
         options = {**options, "origin": [a + b for a, b in zip(earlier, origin, strict=True)]}
-        told = (f"coordinates count from {options['origin']} m",)
-        asked.report(Event("surface", told[0], Kind.NOTE))
+        told = (
+            *told,
+            f"coordinates count from {options['origin']} m",
+        )
+        asked.report(Event("surface", told[-1], Kind.NOTE))
     asked.report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
 
     plinths = plinths_for(surface) if "above" not in options else None
@@ -153,7 +168,7 @@ def _gone_on(asked: _Asked, ready: _Ready, why: str, taken: WayOut) -> dict[str,
     )
     file = asked.file
     if taken.file is not None:
-        file, ready = taken.file, _read(asked, taken.file, {})
+        file, ready = taken.file, _read(asked, taken.file, {}, 0.0)  # the very surface that stands
         told = (*told, *ready.told)
     worth = Allowance.for_size(ready.surface, taken.wish.spacing)
     design = finished_design(taken.design, ready.surface, taken.wish, asked.say, worth.part(_SEARCH))

@@ -12,7 +12,7 @@ from shellform.surface.funicular import thrust_shell
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.fills import filled
 from shellform.surface.readers.mend import mended
-from shellform.surface.readers.reading import surface_of
+from shellform.surface.readers.reading import read_surface, surface_of
 from shellform.surface.shape.plate import bent_heights
 from shellform.surface.shape.target import closed_loops
 from shellform.surface.shape.triangles import open_edges
@@ -189,6 +189,32 @@ def test_holes_that_stand_on_the_ground_stay_open():
     assert any("1 that stands on the ground was not" in note for note in surface.mended)
 
 
+def holed_sheet(*cells):
+    """A sheet of 10 m without two squares of so many `cells` of 0.2 m a side."""
+    x, y = (each.ravel() for each in np.meshgrid(*2 * [np.linspace(-5.0, 5.0, 51)]))
+    points = np.column_stack([x, y, 2.0 - 0.04 * (x**2 + y**2)])
+    corner = np.arange(51 * 50).reshape(50, 51)[:, :50]
+    for row, column, width in ((10, 12, cells[0]), (30, 25, cells[1])):
+        corner = np.where(np.isin(corner, corner[row : row + width, column : column + width]), -1, corner)
+    a = corner[corner >= 0]
+    faces = np.vstack([np.column_stack([a, a + 1, a + 52]), np.column_stack([a, a + 52, a + 51])])
+    return points, faces
+
+
+def test_holes_narrower_than_asked_are_closed_and_others_stay(tmp_path):
+    file = tmp_path / "sheet.obj"
+    points, faces = holed_sheet(2, 5)
+    lines = [f"v {x} {y} {z}" for x, y, z in points.tolist()]
+    file.write_text("\n".join([*lines, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist())]))
+    closed = read_surface(file, fill_narrower=0.5)
+    assert closed.holes == 1
+    assert np.ptp(closed.vertices[closed.boundary[1]], axis=0).max() == pytest.approx(1.0)
+    assert "1 hole narrower than 0.5 m was closed" in closed.mended
+    for width, fill, holes in ((0.0, None, 2), (0.3, None, 2), (1.1, None, 0), (0.5, "holes", 0)):
+        assert read_surface(file, fill=fill, fill_narrower=width).holes == holes
+    assert read_surface(file, fill_narrower=0.3).mended == read_surface(file).mended
+
+
 def test_what_can_not_be_closed_smoothly_is_refused():
     # A chimney: its rim is upright.
     rows = [(1.0, 0.0), (0.0, 1.0), (0.0, 1.25), (0.0, 1.5), (0.0, 1.75), (0.0, 2.0)]
@@ -205,15 +231,8 @@ def test_what_can_not_be_closed_smoothly_is_refused():
 
 @pytest.mark.parametrize("width", [2, 3])
 def test_openings_narrower_than_a_twentieth_of_the_extent_are_told_until_they_are_filled(width):
-    """Squares are left out of a sheet of 10 m at two places, 0.4 m wide in the first case and 0.6 m in the
-    second, where 0.5 m is a twentieth."""
-    x, y = (each.ravel() for each in np.meshgrid(*2 * [np.linspace(-5.0, 5.0, 51)]))
-    points = np.column_stack([x, y, 2.0 - 0.04 * (x**2 + y**2)])
-    corner = np.arange(51 * 50).reshape(50, 51)[:, :50]
-    for row, column in ((10, 12), (30, 25)):
-        corner = np.where(np.isin(corner, corner[row : row + width, column : column + width]), -1, corner)
-    a = corner[corner >= 0]
-    faces = np.vstack([np.column_stack([a, a + 1, a + 52]), np.column_stack([a, a + 52, a + 51])])
+    """A twentieth of the sheet is 0.5 m."""
+    points, faces = holed_sheet(width, width)
     surface = surface_of(Draft(points, faces), "sheet")
     assert len(surface.boundary) == 3
     told = [note for note in surface.mended if "2 openings are narrower" in note]

@@ -30,14 +30,16 @@ _UPRIGHT = 0.15  # least vertical part of a normal that a fill can start from
 _SHORT = 0.5  # of an edge: footprints nearer than that to the edge are left out
 
 
-def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) -> Draft:
-    """The draft, z up and mended, with its "holes", its open "edges", or "all" closed; its own vertices come
-    first and don't move.
+def filled(
+    draft: Draft, where: str, *, what: str | None = None, narrower: float = 0.0, ground: float | None = None
+) -> Draft:
+    """The draft, z up and mended, with its "holes", its open "edges", or "all" closed, and of holes in any
+    case those `narrower`, m, along each axis; its own vertices come first and don't move.
 
     Edges come down to the `ground`, m (left out: the edge's lowest point). Raises InputError where there is
     nothing to close or no smooth way to.
     """
-    if what not in ("holes", "edges", "all"):
+    if what not in (None, "holes", "edges", "all"):
         raise InputError(
             "must be holes, edges or all",
             where="surface.fill",
@@ -58,13 +60,18 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
     own, closed = len(draft.points), replace(draft, normals=normals)
     holes = [loop for loop in loops if loop is not outer and not low[loop].any()]
     standing = len(loops) - 1 - len(holes)
-    for loop in holes if what != "edges" else []:
+    every = what in ("holes", "all")
+    narrow = [loop for loop in holes if width_of(draft.points, loop) < narrower]
+    for loop in holes if every else narrow:
         closed = _with_fill(closed, *_capped(draft.points, normals, loop, where))
-    arches = _arches(outer, low, where) if what != "holes" else []
+    arches = _arches(outer, low, where) if what in ("edges", "all") else []
     for arch in arches:
         closed = _with_fill(closed, *_footed(draft.points, normals, arch, level, where))
     notes = []
-    if what != "edges":
+    if narrow and not every:
+        told = how_many(len(narrow), "hole", "holes")
+        notes.append(f"{told} narrower than {narrower:g} m {'was' if len(narrow) == 1 else 'were'} closed")
+    if every:
         notes.append(
             how_many(len(holes), "hole was closed", "holes were closed")
             + (
@@ -73,7 +80,7 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
                 else ""
             )
         )
-    if what != "holes":
+    if what in ("edges", "all"):
         notes.append(
             how_many(
                 len(arches),
@@ -87,6 +94,11 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
         estimated = make_surface(closed.points, closed.triangles, source=where).normals
         closed = replace(closed, normals=np.vstack([estimated[:own], closed.normals[own:]]))
     return closed
+
+
+def width_of(points: Reals, loop: Indices) -> float:
+    """How wide an opening is, m: the larger side of a box round it."""
+    return float(np.ptp(points[loop], axis=0).max())
 
 
 def _upwards(draft: Draft) -> Draft:

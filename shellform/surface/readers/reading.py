@@ -17,7 +17,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, how_many, require_file, unreadable
 from shellform.surface.readers import compas, compas_surfaces, foreign, plain
 from shellform.surface.readers.draft import MOST_BYTES, Choice, Draft, noted
-from shellform.surface.readers.fills import filled
+from shellform.surface.readers.fills import filled, width_of
 from shellform.surface.readers.mend import mended
 from shellform.surface.readers.teeth import is_ragged
 from shellform.surface.shape.target import Surface, make_surface
@@ -53,8 +53,8 @@ _STEPS = (
 )
 _NARROW = 0.05  # of the larger extent: openings that aren't as wide lie between two rods, as far apart as these usually are
 _NARROW_TOLD = (
-    "{} narrower than a twentieth of its extent, and an edge beam goes round each: close them where they aren't meant "
-    "(surface.fill, --fill holes, which closes all)"
+    "{} narrower than a twentieth of its extent: what is narrower than rods are apart `new` closes, and an edge beam goes "
+    "round each other one; --fill holes (surface.fill) closes all"
 )
 _HANGS = "its highest point lies on its edge and its lowest does not: where it is drawn as it hangs, turn it over (surface.up, --up {})"
 _UPRIGHT_AS_READ = "it stands upright, with a plan of {:.0f} % of its area"
@@ -85,6 +85,7 @@ def read_surface(
     face: str | None = None,
     piece: int | None = None,
     fill: str | None = None,
+    fill_narrower: float = 0.0,
     ground: float | None = None,
 ) -> Surface:
     """The surface in a file, in metres, z up.
@@ -98,6 +99,7 @@ def read_surface(
     - `piece`: of several separate ones, 1 being the largest.
     - `fill`: "holes", "edges" or "all" closes openings (fills.py), edges down to the `ground`, m; left out:
       the edge's lowest point.
+    - `fill_narrower`, m: closes holes narrower than that, whatever else is closed.
 
     `mended` of the result tells what was done. Raises InputError.
     """
@@ -143,8 +145,10 @@ def read_surface(
         for axis in _OTHER_AXES:
             turned, _ = whole(axis)
             if _plan_share(turned.points, turned.triangles) >= _UPRIGHT:
-                return _closed(noted(turned, _TURNED.format(axis)), axis, str(file), fill, ground)
-    return _closed(as_given, vertical, str(file), fill, ground)
+                return _closed(
+                    noted(turned, _TURNED.format(axis)), axis, str(file), fill, fill_narrower, ground
+                )
+    return _closed(as_given, vertical, str(file), fill, fill_narrower, ground)
 
 
 def surface_of(
@@ -157,14 +161,16 @@ def surface_of(
     ground: float | None = None,
 ) -> Surface:
     """A draft in metres, z up, mended and closed as `read_surface` says."""
-    return _closed(mended(draft, source, face=face, piece=piece), "z", source, fill, ground)
+    return _closed(mended(draft, source, face=face, piece=piece), "z", source, fill, 0.0, ground)
 
 
-def _closed(whole: Draft, vertical: str, source: str, fill: str | None, ground: float | None) -> Surface:
+def _closed(
+    whole: Draft, vertical: str, source: str, fill: str | None, narrower: float, ground: float | None
+) -> Surface:
     """Of a mended draft whose `vertical` is that axis of its file, its openings closed where that is asked
     for."""
-    if fill is not None:
-        whole = filled(whole, source, what=fill, ground=ground)
+    if fill is not None or narrower > 0.0:
+        whole = filled(whole, source, what=fill, narrower=narrower, ground=ground)
     surface = make_surface(whole.points, whole.triangles, normals=whole.normals, source=source)
     notes = (*whole.notes, *surface.mended, *_doubts(surface, vertical))
     return Surface(surface.vertices, surface.triangles, surface.normals, source, notes)
@@ -176,7 +182,7 @@ def _doubts(surface: Surface, vertical: str) -> tuple[str, ...]:
     doubts = list[str]()
     if any(is_ragged(surface.vertices, loop) for loop in surface.boundary):
         doubts.append(_RAGGED)
-    widths = [float(np.ptp(surface.vertices[loop], axis=0).max()) for loop in surface.boundary[1:]]
+    widths = [width_of(surface.vertices, loop) for loop in surface.boundary[1:]]
     narrow = sum(width < _NARROW * float(surface.size.max()) for width in widths)
     if narrow:
         doubts.append(_NARROW_TOLD.format(how_many(narrow, "opening is", "openings are")))
