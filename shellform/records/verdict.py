@@ -47,7 +47,13 @@ def _cautions(found: Sequence[Check], design: str) -> tuple[str, ...]:
         cell = check.cells.get(design, UNASKED)
         if cell.asked and cell.caution:
             named.setdefault(cell.caution, []).append(check.name)
-    return tuple(f"{', '.join(names)}: {caution}." for caution, names in named.items())
+    return tuple(f"{_in_a_row(names)}: {caution}." for caution, names in named.items())
+
+
+def _in_a_row(names: Sequence[str]) -> str:
+    """Names of checks as a sentence begins with them."""
+    first, *others = names
+    return ", ".join([first, *(f"{each[:1].lower()}{each[1:]}" for each in others)])
 
 
 def to_build(found: Sequence[Check], designs: Sequence[str]) -> str:

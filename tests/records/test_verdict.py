@@ -261,7 +261,7 @@ def test_a_design_whose_structures_snap_far_on_their_way_holds_and_asks_for_care
     assert told.failed == told.not_examined == ()
     assert told.cautions == (
         (
-            "As built under 1.2 × the load, As built under the design load: 3 of 200 structures as built snap at a rod's end or "
+            "As built under 1.2 × the load, as built under the design load: 3 of 200 structures as built snap at a rod's end or "
             "a cell on the way, by up to 82 mm: more than the 30 mm of optimise.deviation.",
         )
         if care
