@@ -36,6 +36,7 @@ __all__ = ["clock_without_compiling", "is_kept", "njit", "prange", "set_num_thre
 
 _WHOLE = "one to one and a half minutes of a free core in all"  # 94 s of processor time, measured once beside other work
 _FIRST_TOLD = 10.0  # s of compiling
+_LONGEST_TURN = 300.0  # s that are waited for another process's: one that is stopped keeps its own
 
 
 class _Compilation(event.Listener):  # type: ignore[misc]
@@ -124,7 +125,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             self._turn = _turn(f"{self._cache_file._index_path}.lock")
             found = super().load_overload(sig, target_context)
             if found is not None:
-                self._leave()
+                self.leave()
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -132,12 +133,28 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         try:
             super().save_overload(sig, data)
         finally:
-            self._leave()
+            self.leave()
 
-    def _leave(self) -> None:
+    def leave(self) -> None:
+        """Ends the turn, if there is one."""
         if self._turn is not None:
             os.close(self._turn)
             self._turn = None
+
+
+class _BrokenOff(event.Listener):  # type: ignore[misc]
+    """Ends the turn at a function whose compiling fails or is interrupted: this process may live on."""
+
+    def on_start(self, event: Any) -> None:
+        """Nothing."""
+
+    def on_end(self, event: Any) -> None:
+        cache = event.data["dispatcher"]._cache
+        if event._exc_details is not None and isinstance(cache, _Cache):  # is_failed says the contrary
+            cache.leave()
+
+
+event.register("numba:compile", _BrokenOff())
 
 
 class _Entry(IndexDataCacheFile):  # type: ignore[misc]
@@ -156,19 +173,32 @@ class _Entry(IndexDataCacheFile):  # type: ignore[misc]
 
 
 def _turn(path: str) -> int:
-    """The descriptor of a lock, until it is closed. What is waited for it counts as compiling."""
+    """The descriptor of a lock, until it is closed, or after the longest wait of none. What is waited for it
+    counts as compiling."""
     held = os.open(path, os.O_CREAT | os.O_WRONLY, 0o666)
+    if not _locked(held):
+        _compilation.on_start(None)
+        try:
+            until = time.monotonic() + _LONGEST_TURN
+            while not _locked(held) and time.monotonic() < until:
+                time.sleep(0.05)
+        finally:
+            _compilation.on_end(None)
+    return held
+
+
+def _locked(held: int) -> bool:
+    """Whether the lock is this process's now; always on Windows, which has no such ones: an entry may get
+    lost there, and is compiled again."""
     try:
         import fcntl
-    except ImportError:  # no such locks on Windows: an entry may get lost there, and is compiled again
-        return held
+    except ImportError:
+        return True
     try:
         fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        _compilation.on_start(None)
-        fcntl.flock(held, fcntl.LOCK_EX)
-        _compilation.on_end(None)
-    return held
+        return False
+    return True
 
 
 def _cache_for_now() -> None:

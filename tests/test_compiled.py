@@ -103,6 +103,55 @@ def test_of_processes_side_by_side_one_compiles_a_loop_none_loses_an_entry_and_n
         assert "data saved" not in text
 
 
+BROKEN_OFF = """
+import sys
+from numba.core.errors import TypingError
+from shellform import compiled
+
+kept = compiled.njit(cache=True)(__import__("loop").twice)
+try:
+    kept(1.0)
+except TypingError:
+    print("broken off", flush=True)
+sys.stdin.readline()
+"""
+
+
+def test_a_process_that_lives_on_after_its_compiling_broke_off_keeps_no_other_waiting(tmp_path):
+    (tmp_path / "loop.py").write_text("def twice(x):\n    return x.nothing\n", encoding="utf-8")
+    variables = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}",
+        "SHELLFORM_QUIET": "1",
+    }
+    command = [sys.executable, "-c", BROKEN_OFF]
+    first = subprocess.Popen(command, env=variables, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    try:
+        assert first.stdout.readline() == "broken off\n"
+        second = subprocess.run(
+            command, env=variables, input="go\n", capture_output=True, text=True, timeout=60, check=True
+        )
+    finally:
+        first.communicate("go\n")
+    assert second.stdout == "broken off\n"
+
+
+def test_a_process_that_was_stopped_while_it_compiles_keeps_others_waiting_only_so_long(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(compiled, "_LONGEST_TURN", 0.2)
+    first = compiled._turn(str(tmp_path / "lock"))
+    waited = compiled._compilation.seconds
+    second = compiled._turn(str(tmp_path / "lock"))
+    waited = compiled._compilation.seconds - waited
+    assert not compiled._locked(second)
+    os.close(first)
+    assert compiled._locked(second)
+    os.close(second)
+    assert waited >= 0.2
+
+
 def test_code_that_an_older_version_of_a_function_left_is_never_taken_and_other_functions_keep_theirs(
     tmp_path,
 ):
