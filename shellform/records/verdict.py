@@ -10,6 +10,7 @@ from shellform.errors import how_many
 from shellform.records.check import UNASKED, Cell, Check
 from shellform.records.checks import BUILT
 from shellform.records.summary import VerdictRecord
+from shellform.records.words import run_on
 
 
 def failed(found: Sequence[Check], design: str) -> list[Check]:
@@ -47,13 +48,7 @@ def _cautions(found: Sequence[Check], design: str) -> tuple[str, ...]:
         cell = check.cells.get(design, UNASKED)
         if cell.asked and cell.caution:
             named.setdefault(cell.caution, []).append(check.name)
-    return tuple(f"{_in_a_row(names)}: {caution}." for caution, names in named.items())
-
-
-def _in_a_row(names: Sequence[str]) -> str:
-    """Names of checks as a sentence begins with them."""
-    first, *others = names
-    return ", ".join([first, *(f"{each[:1].lower()}{each[1:]}" for each in others)])
+    return tuple(f"{', '.join(run_on(names))}: {caution}." for caution, names in named.items())
 
 
 def to_build(found: Sequence[Check], designs: Sequence[str]) -> str:

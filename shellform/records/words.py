@@ -132,6 +132,11 @@ def listed(names: Sequence[str]) -> str:
     return f"{', '.join(names[:_LISTED])}{more}"
 
 
+def run_on(parts: Sequence[str]) -> list[str]:
+    """The parts of one sentence: those after the first begin small."""
+    return [part if k == 0 else part[:1].lower() + part[1:] for k, part in enumerate(parts)]
+
+
 def goes_slack_words(cables: Sequence[str]) -> str:
     """Which cables go slack on the way; "" where none does."""
     return f"{', '.join(cables)} {'goes' if len(cables) == 1 else 'go'} slack" if cables else ""

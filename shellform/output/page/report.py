@@ -176,7 +176,7 @@ def _caption(name: str) -> str:
     parts = [
         words.TITLES.get(part, words.LOADS.get(part, part.replace("_", " "))) for part in name.split("-")
     ]
-    said = [part if k == 0 else part[:1].lower() + part[1:] for k, part in enumerate(parts)]
+    said = words.run_on(parts)
     text = said[0] + (": " + ", ".join(said[1:]) if len(said) > 1 else "")
     return text[:1].upper() + text[1:]
 
