@@ -25,6 +25,7 @@ from shellform.surface.shape.target import Surface
 
 FAR = 100.0  # of a surface's larger side, from its origin: there `new` takes one near it
 _DISTANT = 5000.0  # no net is sure to be pulled: at 21 500 none is
+_OF_FILES = ("unit", "up", "layer", "object", "face", "piece", "fill", "fill_narrower", "ground")
 
 
 def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
@@ -96,7 +97,17 @@ def _read(entry: SurfaceEntry, *, allow_scripts: bool) -> Surface:
 
 
 def _built(file: Path, entry: SurfaceEntry) -> Surface:
-    """What a builder script makes; a stranger's, which may hang or crash, in a process of its own."""
+    """What a builder script makes; a stranger's, which may hang or crash, in a process of its own. Raises
+    InputError for entries that only files take."""
+    for name in _OF_FILES:
+        value = getattr(entry, name)
+        if value != SurfaceEntry.model_fields[name].default:
+            raise InputError(
+                f"a builder script takes no {name}: it says in metres and z up what is built and what is open",
+                where=f"surface.{name}",
+                value=value,
+                remedy=f"Leave out surface.{name}.",
+            )
     from shellform.surface import cad, occ
     from shellform.surface.readers.foreign import read_foreign
 

@@ -18,6 +18,7 @@ from shellform.case.build_net import (
     surface_of,
     with_rods,
 )
+from shellform.case.case import shipped_surfaces
 from shellform.case.edge_entries import EdgesEntry
 from shellform.case.entries import NetEntry, SurfaceEntry
 from shellform.errors import InputError
@@ -59,6 +60,24 @@ def test_a_surface_is_counted_from_its_origin_before_it_is_cut_off_above_a_level
 def test_dimensions_are_of_builder_scripts_alone():
     with pytest.raises(InputError, match="only builder scripts have dimensions"):
         surface_of(SurfaceEntry(file="a.obj", dimensions={"width": 2.0}))
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"unit": "mm"},
+        {"up": "y"},
+        {"layer": "roof"},
+        {"fill": "holes"},
+        {"fill_narrower": 0.5},
+        {"ground": 0.0},
+    ],
+)
+def test_a_builder_script_takes_no_entry_of_files(entry):
+    vault = str(shipped_surfaces() / "vault.py")
+    (name,) = entry
+    with pytest.raises(InputError, match=f"a builder script takes no {name}"):
+        surface_of(SurfaceEntry(file=vault, **entry))
 
 
 def case(net=None, edges=None):
