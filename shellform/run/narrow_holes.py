@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from shellform.errors import how_many
 from shellform.run.sizes import first_spacing
-from shellform.surface.readers.fills import width_of
-from shellform.surface.shape.target import ON_GROUND, Surface
+from shellform.surface.readers.fills import openings_of
+from shellform.surface.shape.target import Surface
 
 
 @dataclass(frozen=True)
@@ -53,11 +51,9 @@ def narrow_holes(
     builder scripts, whose openings are meant."""
     if file.suffix.lower() == ".py" or "fill_narrower" in options or options.get("fill") in ("holes", "all"):
         return None
+    if len(surface.boundary) < 2:
+        return None
     width = first_spacing(surface)[0] if spacing is None else spacing
-    height = surface.vertices[:, 2]
-    ground = height.min() + ON_GROUND * np.ptp(height)  # on which doors stand, which stay open (fills.py)
-    count = sum(
-        width_of(surface.vertices, loop) < width and height[loop].min() > ground
-        for loop in surface.boundary[1:]
-    )
+    found = openings_of(surface.vertices, surface.boundary, options.get("ground"))
+    count = len(found.narrower(width))
     return NarrowHoles(count, width) if count else None

@@ -62,6 +62,16 @@ def test_the_spacing_that_is_asked_for_decides(tmp_path, monkeypatch, spacing, h
     assert read(tmp_path, monkeypatch, holed(2, 5), spacing=spacing)[0].holes == holes
 
 
+@pytest.mark.parametrize(("ground", "count"), [(0.0, 1), (1.4, None)])
+def test_no_hole_counts_that_closing_takes_for_a_door_on_the_ground(tmp_path, ground, count):
+    sheet, file = holed(2, 5), tmp_path / "sheet.obj"
+    options = {"ground": ground}
+    found = narrow_holes(sheet, file, options, 0.5)
+    assert (found and found.count) == count
+    closed = surface_of(SurfaceEntry(file=str(as_obj(file, sheet)), fill_narrower=0.5, **options))
+    assert closed.holes == 2 - (count or 0)
+
+
 def test_a_hole_that_cannot_be_closed_stays_and_why_is_told(tmp_path, monkeypatch):
     points, faces = holed_sheet(2, 2)
     sheet = make_surface(points, faces)

@@ -10,6 +10,7 @@ is steeper; or further out, where it leaves the feet in line with the edge on th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,20 +49,11 @@ def filled(
         )
     draft = _upwards(draft)
     normals = make_surface(draft.points, draft.triangles, normals=draft.normals, source=where).normals
-    loops = closed_loops(open_edges(draft.triangles))
-    outline = [
-        float(np.linalg.norm(draft.points[loop] - draft.points[np.roll(loop, 1)], axis=1).sum())
-        for loop in loops
-    ]
-    outer = loops[int(np.argmax(outline))]
-    level = float(draft.points[outer, 2].min()) if ground is None else ground
-    rise = float(draft.points[:, 2].max()) - level
-    low = draft.points[:, 2] <= level + ON_GROUND * rise
+    openings = openings_of(draft.points, closed_loops(open_edges(draft.triangles)), ground)
     own, closed = len(draft.points), replace(draft, normals=normals)
-    holes = [loop for loop in loops if loop is not outer and not low[loop].any()]
-    standing = len(loops) - 1 - len(holes)
+    outer, level, low, holes = openings.outer, openings.level, openings.low, openings.holes
     every = what in ("holes", "all")
-    narrow = [loop for loop in holes if width_of(draft.points, loop) < narrower]
+    narrow = openings.narrower(narrower)
     for loop in holes if every else narrow:
         closed = _with_fill(closed, *_capped(draft.points, normals, loop, where))
     arches = _arches(outer, low, where) if what in ("edges", "all") else []
@@ -75,8 +67,8 @@ def filled(
         notes.append(
             how_many(len(holes), "hole was closed", "holes were closed")
             + (
-                f", {how_many(standing, 'that stands on the ground was not', 'that stand on the ground were not')}"
-                if standing
+                f", {how_many(openings.standing, 'that stands on the ground was not', 'that stand on the ground were not')}"
+                if openings.standing
                 else ""
             )
         )
@@ -94,6 +86,35 @@ def filled(
         estimated = make_surface(closed.points, closed.triangles, source=where).normals
         closed = replace(closed, normals=np.vstack([estimated[:own], closed.normals[own:]]))
     return closed
+
+
+@dataclass(frozen=True, eq=False)
+class Openings(Record):
+    """What a surface's edges enclose: of its `points` (n, 3) those that lie `low` (n,), on the ground at the
+    `level`, m; its `outer` edge, and the `holes` that don't stand on the ground, beside so many `standing`
+    there, as doors do."""
+
+    points: Reals
+    outer: Indices
+    level: float
+    low: Flags
+    holes: tuple[Indices, ...]
+    standing: int
+
+    def narrower(self, width: float) -> list[Indices]:
+        """The holes that are narrower than a width, m."""
+        return [loop for loop in self.holes if width_of(self.points, loop) < width]
+
+
+def openings_of(points: Reals, loops: Sequence[Indices], ground: float | None) -> Openings:
+    """The openings of a surface whose edges are these `loops`, the longest of them the outer one; the
+    `ground`'s level, m (None: the outer edge's lowest point)."""
+    outline = [float(np.linalg.norm(points[loop] - points[np.roll(loop, 1)], axis=1).sum()) for loop in loops]
+    outer = loops[int(np.argmax(outline))]
+    level = float(points[outer, 2].min()) if ground is None else ground
+    low = points[:, 2] <= level + ON_GROUND * (float(points[:, 2].max()) - level)
+    holes = tuple(loop for loop in loops if loop is not outer and not low[loop].any())
+    return Openings(points, outer, level, low, holes, len(loops) - 1 - len(holes))
 
 
 def width_of(points: Reals, loop: Indices) -> float:
