@@ -113,7 +113,12 @@ def falling(search: Search, it: Iterate, design: Design) -> dict[int, float]:
     assert search.asked is not None
     try:
         return to_bear(
-            search.problem.shell, design, search.asked.trial, first=it.fallen, judging=search.judging
+            search.problem.shell,
+            design,
+            search.asked.trial,
+            first=it.fallen,
+            judging=search.judging,
+            before=it.rested,
         )
     except NotConverged:
         return {}

@@ -4,6 +4,7 @@ the same result, to the byte.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 
 import numpy as np
@@ -12,12 +13,15 @@ from shellform.gridshell.gridshell import Design
 from shellform.optimiser.optimum import Checkpoint, arrays_of, states_of
 from shellform.optimiser.search_state import Accepted, Iterate, Search, aimed, kept_in_mind
 from shellform.problem.evaluation import COUNTS
+from shellform.reliability.resting import Resting
+from shellform.structure.elements.state import State
 
 _ARRAYS = ("tensioned", "excess", "needed")
+_PERFECT = "perfect"
 _NUMBERS = tuple(
     each.name
     for each in fields(Iterate)
-    if each.name not in (*_ARRAYS, "point", "accepted", "history", "mind", "remembered")
+    if each.name not in (*_ARRAYS, "point", "accepted", "history", "mind", "remembered", "rested")
 )
 
 
@@ -39,6 +43,9 @@ def tell(search: Search, it: Iterate) -> None:
         "accepted objective": np.array([each.objective for each in it.accepted]),
     }
     arrays |= arrays_of(it.point.states)
+    numbers["rested"] = {name: list(own.drawn) for name, own in it.rested.items()}
+    for name, own in it.rested.items():
+        arrays |= arrays_of({_PERFECT: own.perfect, **_by_text(own.drawn)}, _prefix(name))
     numbers["radius"], numbers["mind"] = design.radius, {}
     if it.mind is not None and it.remembered is not None:
         numbers["mind"] = {str(each.number): each.least for each in it.mind.scenarios}
@@ -84,5 +91,21 @@ def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
         )
     )
     began = search.began - checkpoint.history[-1].seconds
-    it = Iterate(point, before, tuple(checkpoint.history), mind=mind, remembered=remembered, **kept)
+    rested = {name: _rested(arrays, name, drawn) for name, drawn in numbers["rested"].items()}
+    it = Iterate(
+        point, before, tuple(checkpoint.history), mind=mind, remembered=remembered, rested=rested, **kept
+    )
     return replace(search, began=began), it
+
+
+def _rested(arrays: Mapping[str, np.ndarray], load: str, drawn: Sequence[int]) -> Resting:
+    found = states_of(arrays, [_PERFECT, *map(str, drawn)], _prefix(load))
+    return Resting(found[_PERFECT], {number: found[str(number)] for number in drawn})
+
+
+def _by_text(drawn: Mapping[int, State]) -> dict[str, State]:
+    return {str(number): state for number, state in drawn.items()}
+
+
+def _prefix(load: str) -> str:
+    return f"rested under {load}: "

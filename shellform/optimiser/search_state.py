@@ -23,10 +23,10 @@ from shellform.problem.evaluation import Evaluated, Evaluator
 from shellform.problem.paths import follow, in_tension, without_slack
 from shellform.problem.problem import FEASIBLE, LoadCase, Problem
 from shellform.reliability.requirements import SEED, Demand, largest_on_path
+from shellform.reliability.resting import Resting
 from shellform.reliability.scenarios import FactorsAsBuilt, scenarios
 from shellform.reliability.scenarios import remembered as remembered_in
 from shellform.reliability.trial_structures import Judging
-from shellform.structure.solve.loading import Loaded
 
 Watch = Callable[[Step], None]
 Keep = Callable[[Checkpoint], None]
@@ -135,6 +135,7 @@ class Iterate(Record):
     As built:
     - `fallen`: numbers of structures that have, the last ones first; `fell`: whether the last design has.
     - `samples`: fresh ones drawn so far.
+    - `rested`: where the structures tried rest in the last design that stood, by the largest load of a path.
     - `mind`: drawn structures that are to bear their loads, None where nothing but stiffness leads the
       search; `remembered`: the design in which they were followed.
 
@@ -174,6 +175,7 @@ class Iterate(Record):
     until: int = 0
     begun: int = 0
     samples: int = 0
+    rested: Mapping[str, Resting] = field(default_factory=dict)
 
 
 class Models:
@@ -373,7 +375,8 @@ def finish(search: Search, it: Iterate) -> Optimum:
         )
     design = without_slack(shell, it.point.design, it.point.states[search.base])
     loaded = follow(shell, design, {"none": none, **problem.loads})
-    last = _judged(search, design, loaded, it.phase)
+    states = {name: loaded[name].equilibrium.state for name in problem.loads}
+    last = record(search, evaluator.seed(design, states, 1.0), 1.0, True, it.phase)
     return Optimum(
         problem=problem,
         design=design,
@@ -393,8 +396,3 @@ def finish(search: Search, it: Iterate) -> Optimum:
         fallen=it.fallen,
         mind={} if it.mind is None else {each.number: each.least for each in it.mind.scenarios},
     )
-
-
-def _judged(search: Search, design: Design, loaded: Mapping[str, Loaded], phase: str) -> Step:
-    states = {name: loaded[name].equilibrium.state for name in search.problem.loads}
-    return record(search, search.evaluator.seed(design, states, 1.0), 1.0, True, phase)

@@ -110,16 +110,23 @@ def sound(search: Search, before: Accepted) -> Evaluated | None:
 
 
 def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]:
-    """Whether the design stands as built, and the iterate that knows which structures fell."""
+    """Whether the design stands as built, and the iterate that knows which structures fell, and if it does,
+    where the others rest."""
     if search.asked is None:
         return True, it
     found = judge_trial(
-        search.problem.shell, built, search.asked.trial, first=it.fallen, judging=search.judging
+        search.problem.shell,
+        built,
+        search.asked.trial,
+        first=it.fallen,
+        judging=search.judging,
+        before=it.rested,
     )
     search.evaluator.factorisations += found.factorisations
     fallen = [number for own in found.fallen.values() for number in own]
     fallen = list(dict.fromkeys([*fallen, *it.fallen]))
-    return found.stands, replace(it, fallen=tuple(fallen), fell=not found.stands)
+    rested = found.rested if found.stands else it.rested
+    return found.stands, replace(it, fallen=tuple(fallen), fell=not found.stands, rested=rested)
 
 
 def fresh(search: Search, it: Iterate) -> tuple[JudgedTrial, Iterate]:

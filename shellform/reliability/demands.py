@@ -21,6 +21,7 @@ from shellform.reliability.requirements import (
     largest_on_path,
     may_fall,
 )
+from shellform.reliability.resting import Resting
 from shellform.reliability.safety import Safety
 from shellform.reliability.trial_structures import JudgedTrial, Judging, try_structures
 
@@ -103,11 +104,13 @@ def to_bear(
     *,
     first: Sequence[int] = (),
     judging: Judging | None = None,
+    before: Mapping[str, Resting] | None = None,
 ) -> dict[int, float]:
     """The numbers of structures that fall under loads on the design load's path where more do than may, and
     the factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its critical
-    factor, under PERFECT. Raises NotConverged where the design has no unloaded equilibrium."""
-    found = try_structures(shell, design, asked, first=first, whole=True, judging=judging)
+    factor, under PERFECT. `before`: where structures rested in an earlier design. Raises NotConverged where
+    the design has no unloaded equilibrium."""
+    found = try_structures(shell, design, asked, first=first, whole=True, judging=judging, before=before)
     _, shares = largest_on_path(asked)
     return _aims(
         asked, found, {name: found.fallen[name] for name in sorted(shares, key=lambda each: -shares[each])}

@@ -16,9 +16,10 @@ from shellform.errors import NotConverged
 from shellform.reliability.branch import STRAY, Branch
 from shellform.reliability.drawing import Errors, built_beams, built_cables, built_load
 from shellform.reliability.perfect import Perfect
+from shellform.reliability.resting import Resting
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams
-from shellform.structure.elements.state import State, moved
+from shellform.structure.elements.state import State, motion, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite, Symmetric
@@ -35,7 +36,8 @@ MARKED = 1 / 512  # of the load, next to a factor at which it counts on which si
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
 RESOLUTION = 1 / 256  # of the load, to which it is found where it is told
 _RELAXING = 25  # steps to the unloaded state, before it is relaxed instead
-_BESIDE = 10  # factorisations from the perfect structure's loaded state
+_BESIDE = 10  # steps from the perfect structure's loaded state
+_AS_BEFORE = 16  # steps from where a structure rested in another design
 _RELAXATIONS = 150  # factorisations of a relaxation: what takes more has none
 SNAPS = 3  # local ones, that a structure may go on after
 _BEYOND = 2.0  # resolutions of its path, where a structure is relaxed that may have snapped
@@ -268,7 +270,26 @@ class Loading(Branch):
         if self.bench.loaded is None:
             return None
         begin, foreseen = self._taken_along(self.nominal.states[-1], self.load, self.bench.loaded)
-        found = self.newton(begin, self.load, limit=_BESIDE, tolerance=ON_THE_WAY, foreseen=foreseen)
+        return self._next_to(begin, foreseen, limit=_BESIDE)
+
+    def as_before(self, before: Resting) -> Here | None:
+        """The equilibrium under the whole load next to where the structure of this number rested in another
+        design, moved on as the perfect one has from there, by damped steps where it takes them; None where
+        these lead to none within STRAY of the span, or it wasn't seen to rest."""
+        own = before.drawn.get(self.number)
+        if own is None or not self.nominal.bears:
+            return None
+        change = motion(before.perfect, self.nominal.states[-1])
+        turned = self.assembly.evaluate(own, tangent=False).turned
+        begin = moved(own, self.assembly.chords.corrected(own, change))
+        return self._next_to(begin, self.foreseen(own, turned, change), limit=_AS_BEFORE, damped=True)
+
+    def _next_to(self, begin: State, foreseen: Foreseen, *, limit: int, damped: bool = False) -> Here | None:
+        """The equilibrium under the whole load to which whole steps lead from a state, so many at most,
+        within STRAY of the span of it."""
+        found = self.newton(
+            begin, self.load, limit=limit, tolerance=ON_THE_WAY, foreseen=foreseen, damped=damped
+        )
         if found is None or self._farthest(found.state, begin) > STRAY * self.span:
             return None
         return found

@@ -38,6 +38,7 @@ from shellform.reliability.path_of_one import (
 )
 from shellform.reliability.perfect import Perfect, perfect
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
+from shellform.reliability.resting import Resting
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
@@ -144,16 +145,26 @@ class Workshop:
             errors, lambda own: self._ended(own, own.borne(most, step, resolution), most, tell)
         )
 
-    def rests(self, errors: Errors, *, resolution: float, marks: Sequence[float] = ()) -> Limit:
-        """As `fall`, up to the whole load, but a structure that rests under it beside the perfect one
-        (path_of_one.py) isn't loaded from nothing."""
+    def rests(
+        self,
+        errors: Errors,
+        *,
+        resolution: float,
+        marks: Sequence[float] = (),
+        number: int = 0,
+        before: Resting | None = None,
+    ) -> Limit:
+        """As `fall`, up to the whole load, but a structure that rests under it beside the perfect one, or
+        next to where the one of its `number` rested in another design `before` (path_of_one.py), isn't
+        loaded from nothing."""
 
         def ended(own: Loading) -> Limit:
-            beside = own.beside()
-            end = own.borne(1.0, STEP, resolution, marks=marks) if beside is None else (beside, 1.0)
+            there = None if before is None else own.as_before(before)
+            there = own.beside() if there is None else there
+            end = own.borne(1.0, STEP, resolution, marks=marks) if there is None else (there, 1.0)
             return self._ended(own, end, 1.0, tell=False)
 
-        return self.with_structure(errors, ended)
+        return self.with_structure(errors, ended, number=number)
 
     def _ended(self, own: Loading, end: tuple[Here | None, float], most: float, tell: bool) -> Limit:
         here, factor = end

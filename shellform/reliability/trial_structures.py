@@ -3,8 +3,9 @@
 They are drawn with all deviations enlarged (requirements.py). The same numbers are drawn for every design
 (common random numbers), those that fell before first, and no more than it takes to refuse.
 
-A structure counts as standing where it rests under the load beside the perfect one, be it on a path from
-nothing or not (path_of_one.py); a finished design's are loaded from nothing.
+A structure counts as standing where it rests under the load beside the perfect one, or next to where it
+rested in an earlier design (resting.py), be it on a path from nothing or not (path_of_one.py); a finished
+design's are loaded from nothing.
 
 The perfect structure's critical factor is asked for beside them, with an allowance for the mesh.
 """
@@ -18,8 +19,10 @@ from dataclasses import dataclass, field, replace
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.reliability.drawing import PERFECT, draw_errors
+from shellform.reliability.path_of_one import Limit
 from shellform.reliability.perfect import TO_ITS_END, Perfect, perfect
 from shellform.reliability.requirements import SEED, Required, critical_wanted
+from shellform.reliability.resting import Resting
 from shellform.reliability.safety import SAME, critical_on_halved, paths
 from shellform.reliability.standing import Workshop
 from shellform.structure.elements.threads import in_turn
@@ -36,26 +39,31 @@ _RESOLUTION = 1 / 32  # of the largest load, to which it is known where a struct
 class JudgedTrial:
     """Numbers of the structures that have `fallen` under each load as far as it took to say whether the
     design `stands`, whether the perfect one keeps its `critical` factor, the `factorisations` spent, and the
-    `factors` of the largest load on the design load's path that structures bear."""
+    `factors` of the largest load on the design load's path that structures bear. Where structures `rested`
+    under each path's largest load, if an earlier design's were given."""
 
     fallen: Mapping[str, tuple[int, ...]]
     critical: bool
     stands: bool
     factorisations: int
     factors: Mapping[int, float] = field(default_factory=dict)
+    rested: Mapping[str, Resting] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class _Path:
-    """A design on one path of the loads `asked` for: the largest of these, of which the others are `shares`,
-    on the `nominal` structure from which the `workshop` makes drawn ones, and what of it the perfect one is
-    `wanted` to bear (0: that isn't asked)."""
+    """A design on one path of the loads `asked` for: the `largest` of these, of which the others are
+    `shares`, on the `nominal` structure from which the `workshop` makes drawn ones, and what of it the
+    perfect one is `wanted` to bear (0: that isn't asked). `before`: where structures rested under it in an
+    earlier design."""
 
     asked: Required
+    largest: str
     shares: Mapping[str, float]
     nominal: Perfect
     workshop: Workshop
     wanted: float
+    before: Resting | None
 
     @property
     def of_design_load(self) -> bool:
@@ -68,12 +76,12 @@ class _Path:
         own = [each for each in order if self.of_design_load or each in self.asked.numbers]
         return [PERFECT, *own] if self.wanted > 0.0 else own
 
-    def borne(self, number: int) -> tuple[float, int]:
-        """The share of the largest load that a structure bears, and the factorisations spent."""
+    def borne(self, number: int) -> Limit:
+        """The share of the largest load that a structure bears, with the state there."""
         asked, marks = self.asked, tuple(self.shares.values())
         errors = draw_errors(self.nominal.members, asked.tolerances(number), asked.safety.seed + SEED, number)
         if number == PERFECT:  # whose path is known so far
-            found = self.workshop.limit(
+            return self.workshop.limit(
                 errors,
                 most=self.wanted,
                 resolution=_RESOLUTION,
@@ -82,34 +90,42 @@ class _Path:
                 marks=marks,
                 heeding=False,  # a fifth of a trial; the design to build is judged heeding
             )
-        else:
-            found = self.workshop.rests(errors, resolution=_RESOLUTION, marks=marks)
-        return found.factor, found.factorisations
+        return self.workshop.rests(
+            errors, resolution=_RESOLUTION, marks=marks, number=number, before=self.before
+        )
 
 
-def _paths(shell: Gridshell, design: Design, asked: Required, critical: bool) -> Iterator[_Path]:
+def _paths(
+    shell: Gridshell, design: Design, asked: Required, critical: bool, before: Mapping[str, Resting]
+) -> Iterator[_Path]:
     """The paths of the loads asked for, one after the other: each costs the perfect structure's own."""
     for largest, shares in paths(asked.loads).items():
         nominal = perfect(shell, design, asked.loads[largest], step=TO_ITS_END, heeding=False)
         wanted = critical_wanted(asked, shares) if critical else 0.0
-        yield _Path(asked, shares, nominal, Workshop(nominal), wanted)
+        yield _Path(asked, largest, shares, nominal, Workshop(nominal), wanted, before.get(largest))
 
 
 class _Count:
-    """What has been found of a design so far, as JudgedTrial has it."""
+    """What has been found of a design so far, as JudgedTrial has it; where structures rest if that is to be
+    `remembered`."""
 
-    def __init__(self, asked: Required) -> None:
-        self.asked = asked
+    def __init__(self, asked: Required, *, remembered: bool) -> None:
+        self.asked, self.remembered = asked, remembered
         self.fallen: dict[str, list[int]] = {name: [] for name in asked.loads}
         self.factors: dict[int, float] = {}
+        self.rested: dict[str, Resting] = {}
         self.kept, self.spent = True, 0
 
-    def add(self, path: _Path, number: int, factor: float, spent: int) -> None:
+    def add(self, path: _Path, number: int, found: Limit) -> None:
         """What one structure bears on a path."""
-        self.spent += spent
+        factor = found.factor
+        self.spent += found.factorisations
         if number == PERFECT:
             self.kept = factor >= path.wanted * (1.0 - SAME)
             return
+        if self.remembered and factor >= 1.0 and path.nominal.bears:
+            known = self.rested.get(path.largest, Resting(path.nominal.states[-1], {}))
+            self.rested[path.largest] = replace(known, drawn={**known.drawn, number: found.state})
         if path.of_design_load:
             self.factors[number] = factor
         for name, share in path.shares.items():
@@ -125,7 +141,7 @@ class _Count:
     def judged(self) -> JudgedTrial:
         """As it is told."""
         fallen = {name: tuple(own) for name, own in self.fallen.items()}
-        return JudgedTrial(fallen, self.kept, self.stands, self.spent, self.factors)
+        return JudgedTrial(fallen, self.kept, self.stands, self.spent, self.factors, self.rested)
 
 
 def try_structures(
@@ -137,18 +153,20 @@ def try_structures(
     critical: bool = True,
     whole: bool = False,
     judging: Judging | None = None,
+    before: Mapping[str, Resting] | None = None,
 ) -> JudgedTrial:
     """The design judged by the search's structures, the numbers `first` before the others, and no more of
     them than it takes to refuse it but where the `whole` sample is asked for. Those of `first` that are of
     other samples, where they fell under the design load, have to stand under it and count under no other.
-    Raises NotConverged where it has no unloaded equilibrium."""
-    count = _Count(asked)
+    `before`: where structures rested in an earlier design, from where these are sought; None: that isn't
+    known, and isn't wanted of this one. Raises NotConverged where it has no unloaded equilibrium."""
+    count = _Count(asked, remembered=before is not None)
     order = [*first, *(number for number in asked.numbers if number not in set(first))]
-    for path in _paths(shell, design, asked, critical):
+    for path in _paths(shell, design, asked, critical, before or {}):
         queue = path.queue(order)
         with closing(in_turn(path.borne, queue)) as results:
             for loaded, number in enumerate(queue, start=1):
-                count.add(path, number, *next(results))
+                count.add(path, number, next(results))
                 if loaded % _AT_ONCE and loaded < len(queue):
                     continue
                 if judging is not None:
@@ -166,10 +184,11 @@ def judge_trial(
     first: Sequence[int] = (),
     whole: bool = False,
     judging: Judging | None = None,
+    before: Mapping[str, Resting] | None = None,
 ) -> JudgedTrial:
     """As `try_structures`; a design without unloaded equilibrium doesn't stand."""
     try:
-        return try_structures(shell, design, asked, first=first, whole=whole, judging=judging)
+        return try_structures(shell, design, asked, first=first, whole=whole, judging=judging, before=before)
     except NotConverged as error:
         return JudgedTrial({name: () for name in asked.loads}, False, False, error.iterations)
 

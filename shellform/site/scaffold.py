@@ -36,7 +36,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.site.erection_steps import SMALLEST, ErectionStep, Holding, Site, laid_out
 from shellform.structure.elements import rotation
 from shellform.structure.elements.ropes import Ropes
-from shellform.structure.elements.state import State
+from shellform.structure.elements.state import State, motion
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.drive import Drive
@@ -273,10 +273,8 @@ class Scaffold:
 
     def _eased(self, state: State, goal: State, moved: Flags) -> Drive:
         """Degrees of freedom (n, 6) that are held moved to where they are in another state."""
-        back = state.quaternions * [1.0, -1.0, -1.0, -1.0]
-        turns = rotation.to_vectors(rotation.product(goal.quaternions, back))
-        motion = np.hstack([goal.positions - state.positions, turns])
-        return Drive(np.zeros_like(motion), np.where(moved, motion, 0.0), self.weight)
+        way = motion(state, goal)
+        return Drive(np.zeros_like(way), np.where(moved, way, 0.0), self.weight)
 
     def _handed(self, site: Site, state: State) -> Drive:
         """What held the state where nothing holds it any more, as a dead load that goes."""

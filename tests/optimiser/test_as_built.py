@@ -53,9 +53,8 @@ def test_a_search_with_safety_resumed_in_thinning_ends_with_the_same_design_to_t
 
 
 def test_where_no_accepted_design_stands_the_search_says_so(stout, problem, monkeypatch):
-    def falls(shell, design, asked, *, first=(), judging=None):
-        found = judge_trial(shell, design, asked, first=first, judging=judging)
-        return replace(found, stands=False)
+    def falls(shell, design, asked, **how):
+        return replace(judge_trial(shell, design, asked, **how), stands=False)
 
     monkeypatch.setattr(trials, "judge_trial", falls)
     best = sf.optimise(
@@ -68,8 +67,8 @@ def test_polishing_that_spends_what_stands_comes_back_with_the_design_before_it(
     best, _ = found
     before = best.design
 
-    def only_before(shell, design, asked, *, first=(), judging=None):
-        own = judge_trial(shell, design, asked, first=first, judging=judging)
+    def only_before(shell, design, asked, **how):
+        own = judge_trial(shell, design, asked, **how)
         return replace(own, stands=bool(np.array_equal(design.rest_length, before.rest_length)))
 
     monkeypatch.setattr(trials, "judge_trial", only_before)

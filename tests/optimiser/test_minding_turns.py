@@ -154,8 +154,9 @@ def test_what_falls_is_tried_with_what_fell_first_and_a_design_without_equilibri
         return {3: 1.0}
 
     monkeypatch.setattr(minding, "to_bear", to_bear)
-    assert minding.falling(search, iterate(fallen=(5, 2)), "here") == {3: 1.0}
-    assert asked == [("shell", "here", "trial", {"first": (5, 2), "judging": "judging"})]
+    assert minding.falling(search, iterate(fallen=(5, 2), rested={"wet": "there"}), "here") == {3: 1.0}
+    how = {"first": (5, 2), "judging": "judging", "before": {"wet": "there"}}
+    assert asked == [("shell", "here", "trial", how)]
 
     def none(*_, **__):
         raise NotConverged("no unloaded equilibrium")

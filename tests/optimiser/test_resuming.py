@@ -13,8 +13,9 @@ from shellform.optimiser import resuming
 from shellform.optimiser.optimum import Checkpoint, Step
 from shellform.optimiser.search_state import Accepted, Iterate, Search
 from shellform.problem.evaluation import COUNTS
+from shellform.reliability.resting import Resting
 from shellform.reliability.scenarios import FactorsAsBuilt, Scenario
-from shellform.structure.elements.state import State, at_rest
+from shellform.structure.elements.state import State, at_rest, from_vectors
 
 PLACES = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 0.25]])
 
@@ -93,7 +94,9 @@ def same(one, other):
 def test_where_a_search_stands_comes_back_with_all_that_it_knows(search, mind):
     search, told = search
     elsewhere = design_of(1.5, 2.5, 3.5, radius=0.4)
-    it = iterate(mind=mind and mind_of(mind), remembered=mind and elsewhere)
+    turned = from_vectors(PLACES + 0.25, 0.1 * PLACES)
+    rested = {"wetter": Resting(turned, {4: at_rest(PLACES), 100_002: at_rest(PLACES + 1.0)})}
+    it = iterate(mind=mind and mind_of(mind), remembered=mind and elsewhere, rested=rested)
     resuming.tell(search, it)
     (checkpoint,) = told.kept
     numbers = json.loads(json.dumps(dict(checkpoint.numbers)))  # as a file gives them back
@@ -104,7 +107,16 @@ def test_where_a_search_stands_comes_back_with_all_that_it_knows(search, mind):
     assert {name: getattr(search.evaluator, name) for name in COUNTS} == {
         name: 10 * k + 1 for k, name in enumerate(COUNTS)
     }
-    known = {each.name for each in fields(Iterate)} - {"point", "accepted", "mind", "remembered"}
+    (load,) = found.rested
+    assert (load, list(found.rested[load].drawn)) == ("wetter", [4, 100_002])
+    for state, own in zip(
+        (found.rested[load].perfect, *found.rested[load].drawn.values()),
+        (turned, *rested[load].drawn.values()),
+        strict=True,
+    ):
+        assert state.positions.tolist() == own.positions.tolist()
+        assert state.quaternions.tolist() == own.quaternions.tolist()
+    known = {each.name for each in fields(Iterate)} - {"point", "accepted", "mind", "remembered", "rested"}
     for name in known:
         assert np.array_equal(getattr(found, name), getattr(it, name)), name
     assert same(found.point.design, it.point.design)

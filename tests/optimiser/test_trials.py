@@ -147,19 +147,23 @@ def test_structures_that_have_fallen_last_are_tried_first(monkeypatch):
 
     def stands(shell, built, trial, **how):
         asked.append((shell, built, trial, how))
-        return judged({"wet": (3, 1), "wetter": (1, 5)})
+        return replace(judged({"wet": (3, 1), "wetter": (1, 5)}), rested={"wetter": "elsewhere"})
 
     monkeypatch.setattr(trials, "judge_trial", stands)
     search = searching(asked=SimpleNamespace(trial="trial"))
-    holds, it = trials.standing(search, iterate(fallen=(5, 8, 3)), "built")
+    begun = iterate(fallen=(5, 8, 3), rested={"wetter": "before"})
+    holds, it = trials.standing(search, begun, "built")
     assert not holds
     assert (it.fallen, it.fell) == ((3, 1, 5, 8), True)
-    assert asked == [("shell", "built", "trial", {"first": (5, 8, 3), "judging": "judging"})]
+    how = {"first": (5, 8, 3), "judging": "judging", "before": begun.rested}
+    assert asked == [("shell", "built", "trial", how)]
+    assert it.rested == begun.rested, "a design that falls leaves what is known of the last one that stood"
     assert search.evaluator.factorisations == 111
-    monkeypatch.setattr(trials, "judge_trial", lambda *_, **__: judged({"wet": ()}, stands=True))
+    rested = replace(judged({"wet": ()}, stands=True), rested={"wetter": "here"})
+    monkeypatch.setattr(trials, "judge_trial", lambda *_, **__: rested)
     holds, after = trials.standing(search, it, "built")
     assert holds
-    assert (after.fallen, after.fell) == (it.fallen, False)
+    assert (after.fallen, after.fell, after.rested) == (it.fallen, False, {"wetter": "here"})
     begun = iterate()
     assert trials.standing(searching(asked=None), begun, "built") == (True, begun)
 

@@ -299,7 +299,8 @@ def test_an_equilibrium_is_beside_within_a_hundredth_of_the_span_of_where_its_ta
         newton=newton,
     )
     assert (loading.beside() is not None) == near
-    assert asked == [(2.0, {"limit": 10, "tolerance": path_of_one.ON_THE_WAY, "foreseen": "foreseen"})]
+    how = {"limit": 10, "tolerance": path_of_one.ON_THE_WAY, "foreseen": "foreseen", "damped": False}
+    assert asked == [(2.0, how)]
     loading.newton = lambda *_, **__: None
     assert loading.beside() is None
     loading.bench.loaded = None

@@ -13,6 +13,7 @@ from shellform.reliability.branch import STRAY, Branch
 from shellform.reliability.drawing import built_beams, built_cables, built_load, errors_of, sizes, variables
 from shellform.reliability.path_of_one import BORNE, ENDED, UNLOADED, Limit
 from shellform.reliability.perfect import perfect, perfect_of
+from shellform.reliability.resting import Resting
 from shellform.reliability.standing import Workshop, sample
 from shellform.structure.answers.analysis import analyse
 from shellform.structure.elements.state import State
@@ -72,6 +73,30 @@ def test_what_rests_beside_the_perfect_structure_comes_there_from_nothing_too(do
         else:
             assert found.factorisations > expected.factorisations
     assert stood >= 3
+
+
+def test_what_rested_in_another_design_is_found_next_to_there_in_fewer_factorisations(dome):
+    """Supports 1 mm off leave the first tangent beside the perfect structure indefinite."""
+    load, far = dome.point_load(4.5, every=2), Tolerances(supports=1e-3)
+    start = dome.design()
+    other = replace(start, rest_length=0.999 * start.rest_length)
+    before, nominal = perfect(dome, start, load), perfect(dome, other, load)
+    first, workshop = Workshop(before), Workshop(nominal)
+    helped = 0
+    for number in range(6):
+        errors = drawn(nominal, far, number)
+        rest = first.rests(errors, resolution=1 / 32)
+        if rest.factor < 1.0:
+            continue
+        known = Resting(before.states[-1], {number: rest.state})
+        expected = workshop.rests(errors, resolution=1 / 32)
+        found = workshop.rests(errors, resolution=1 / 32, number=number, before=known)
+        assert found.factor == expected.factor
+        assert found.state.positions == pytest.approx(expected.state.positions, abs=1e-5)
+        helped += found.factorisations < 0.5 * expected.factorisations
+        unknown = workshop.rests(errors, resolution=1 / 32, number=number + 1, before=known)
+        assert unknown.factorisations == expected.factorisations
+    assert helped >= 3
 
 
 def test_nothing_rests_beside_a_perfect_structure_that_falls(dome):
@@ -357,7 +382,7 @@ def workshop(monkeypatch):
     made.nominal = SimpleNamespace(unloaded="unloaded", members="members")
 
     def limit(way, structure, *given, **how):
-        monkeypatch.setattr(made, "with_structure", lambda errors, work: work(structure), raising=False)
+        monkeypatch.setattr(made, "with_structure", lambda errors, work, **_: work(structure), raising=False)
         return getattr(made, way)("errors", *given, **how)
 
     return made, limit

@@ -12,6 +12,7 @@ from shellform.reliability import trial_structures
 from shellform.reliability.demands import aims
 from shellform.reliability.drawing import PERFECT
 from shellform.reliability.requirements import SEED, Required
+from shellform.reliability.resting import Resting
 from shellform.reliability.safety import Safety
 from shellform.reliability.trial_structures import JudgedTrial, try_structures
 from tests.reliability.asked import LOADS, ROUGH, asked_of
@@ -70,13 +71,17 @@ class Tried:
     """Structures that bear factors of the largest load on a path, by number; each takes ten factorisations
     and one for each of its number."""
 
-    def __init__(self, factors, monkeypatch):
-        self.factors, self.loaded, self.looked = factors, [], []
+    def __init__(self, factors, monkeypatch, *, bears=True):
+        self.bears = bears
+        self.factors, self.loaded, self.looked, self.before = factors, [], [], []
         for name, fake in [
             (
                 "perfect",
                 lambda *given, step, heeding: SimpleNamespace(
-                    members=given[2].sum(), known_to=lambda f: ("to", f)
+                    members=given[2].sum(),
+                    known_to=lambda f: ("to", f),
+                    states=("none", "loaded"),
+                    bears=self.bears,
                 ),
             ),
             ("Workshop", self),
@@ -87,10 +92,14 @@ class Tried:
     def __call__(self, _nominal):
         return self
 
-    def rests(self, errors, *, resolution, marks):
-        number, load = errors
+    def rests(self, errors, *, resolution, marks, number, before):
+        assert number == errors[0]
+        _, load = errors
         self.loaded.append((load, number, resolution, marks))
-        return SimpleNamespace(factor=self.factors[number], factorisations=10 + number)
+        self.before.append(before)
+        return SimpleNamespace(
+            factor=self.factors[number], factorisations=10 + number, state=f"rest {number}"
+        )
 
     def limit(self, errors, **how):
         self.looked.append((errors, how))
@@ -98,6 +107,24 @@ class Tried:
 
     def judged(self, asked, **how):
         return try_structures(None, None, asked, **how)
+
+
+def test_where_structures_rest_is_told_and_where_they_did_is_where_they_are_sought(monkeypatch):
+    made = Tried({0: 1.0, 1: 0.9, 2: 1.0}, monkeypatch)
+    asked = asked_of({"wet": 3, "wetter": 3}, tried=3)
+    before = {"wetter": Resting("before", {0: "there"}), "wet": Resting("of no path", {})}
+    found = made.judged(asked, before=before)
+    assert made.before == [before["wetter"]] * 3
+    assert set(found.rested) == {"wetter"}
+    assert found.rested["wetter"].perfect == "loaded"
+    assert found.rested["wetter"].drawn == {0: "rest 0", 2: "rest 2"}
+
+
+def test_where_structures_rest_is_not_kept_unasked_nor_beside_a_perfect_one_that_falls(monkeypatch):
+    asked = asked_of({"wet": 3, "wetter": 3}, tried=3)
+    assert Tried({0: 1.0, 1: 1.0, 2: 1.0}, monkeypatch).judged(asked).rested == {}
+    falling = Tried({0: 1.0, 1: 1.0, 2: 1.0}, monkeypatch, bears=False)
+    assert falling.judged(asked, before={}).rested == {}
 
 
 def test_structures_fall_under_the_loads_that_they_do_not_bear_and_refuse_where_more_do_than_may(monkeypatch):

@@ -12,6 +12,8 @@ from shellform.structure.elements.rotation import (
     product,
     to_vectors,
 )
+from shellform.structure.elements.state import from_vectors as state_of
+from shellform.structure.elements.state import motion, moved
 
 
 def about(axis, degrees):
@@ -79,3 +81,13 @@ def test_between_two_quaternions_the_shorter_way_round_is_gone(sign):
     np.testing.assert_allclose(between(first, sign * second, 0.5), middle, atol=1e-15)
     both = between(np.vstack([first, first]), sign * np.vstack([second, second]), np.array([[0.0], [1.0]]))
     np.testing.assert_allclose(both, np.vstack([first, second]), atol=1e-15)
+
+
+def test_the_motion_from_one_state_to_another_leads_there():
+    rng = np.random.default_rng(3)
+    before = state_of(rng.normal(size=(5, 3)), rng.normal(size=(5, 3)))
+    after = state_of(rng.normal(size=(5, 3)), rng.normal(size=(5, 3)))
+    there = moved(before, motion(before, after))
+    np.testing.assert_allclose(there.positions, after.positions, atol=1e-15)
+    np.testing.assert_allclose(there.rotations, after.rotations, atol=1e-14)
+    assert not motion(after, after).any()

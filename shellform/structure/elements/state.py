@@ -65,6 +65,14 @@ def moved(state: State, step: Reals) -> State:
     return State(state.positions + step[:, :3], rotation.turned(step[:, 3:], state.quaternions))
 
 
+def motion(before: State, after: State) -> Reals:
+    """The step (n, 6) that leads from one state to the other, as `moved` takes it: translations, m, and
+    rotation vectors about global axes, rad, of length at most pi. Digits of a tail don't count."""
+    back = before.quaternions * [1.0, -1.0, -1.0, -1.0]
+    turns = rotation.to_vectors(rotation.product(after.quaternions, back))
+    return np.hstack([after.positions - before.positions, turns])
+
+
 def extended(state: State) -> State:
     """The same state, its digits beyond double precision carried on from here."""
     return (

@@ -16,8 +16,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError, NotConverged
-from shellform.structure.elements import rotation
-from shellform.structure.elements.state import State, moved
+from shellform.structure.elements.state import State, motion, moved
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import TURN, Equilibrium
@@ -133,9 +132,7 @@ class Walk:
         where nothing else moves.
         """
         if self.by_turns:
-            back = before.quaternions * [1.0, -1.0, -1.0, -1.0]
-            turned = rotation.to_vectors(rotation.product(after.quaternions, back))
-            return turned.ravel()[self._flat()]
+            return motion(before, after)[:, 3:].ravel()[self._flat()]
         return (after.positions - before.positions).ravel()[self._flat()]
 
     def point(self, state: State, factor: float, iterations: int) -> OnPath:
