@@ -90,6 +90,7 @@ from shellform.reliability.path_of_one import Limit as Limit
 from shellform.reliability.probability import Standing as Standing
 from shellform.reliability.requirements import Demand as Demand
 from shellform.reliability.requirements import Required as Required
+from shellform.reliability.resting import Resting as Resting
 from shellform.reliability.safety import Judgement as Judgement
 from shellform.reliability.safety import Safety as Safety
 from shellform.reliability.safety import UnderLoad as UnderLoad

@@ -244,7 +244,8 @@ def _polished(
         )
         models = Models(search.evaluator, solver, search.models.reach, whole=alike is not None)
         search = replace(search, always_guarded=True, groups=alike, models=models)
-        it = replace(it, guarded=True, tensioned=np.ones_like(it.tensioned), fallen=best.fallen)
+        every = np.ones_like(it.tensioned)
+        it = replace(it, guarded=True, tensioned=every, fallen=best.fallen, rested=best.rested)
         it = as_borne(search, it, best.mind)
         if best.asked is not None and it.mind is not None:
             search = replace(finely(search, evaluations), asked=best.asked)

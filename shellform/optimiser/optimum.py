@@ -13,6 +13,7 @@ from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design
 from shellform.problem.problem import Problem
 from shellform.reliability.requirements import Demand
+from shellform.reliability.resting import Resting
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import Loaded
 
@@ -105,7 +106,8 @@ class Optimum:
     As built:
     - `asked` of what is made of it, None: nothing.
     - `fallen`: numbers of drawn structures that have in the search; `mind`: those that it kept in mind, with
-      the factor of the largest load that each is to bear.
+      the factor of the largest load that each is to bear; where those that it tried `rested` in the last
+      design that stood (trial_structures.py).
     """
 
     problem: Problem
@@ -125,6 +127,7 @@ class Optimum:
     asked: Demand | None = None
     fallen: tuple[int, ...] = ()
     mind: Mapping[int, float] = field(default_factory=dict)
+    rested: Mapping[str, Resting] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return (

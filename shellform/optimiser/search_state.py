@@ -394,5 +394,6 @@ def finish(search: Search, it: Iterate) -> Optimum:
         stiffness=it.stiffness,
         asked=None if search.asked is None else search.asked.after(it.samples + 1),
         fallen=it.fallen,
+        rested=it.rested,
         mind={} if it.mind is None else {each.number: each.least for each in it.mind.scenarios},
     )

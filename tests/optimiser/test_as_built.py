@@ -78,6 +78,20 @@ def test_polishing_that_spends_what_stands_comes_back_with_the_design_before_it(
     assert polished.status == "no design with less misfit was found"
 
 
+def test_structures_of_polished_designs_are_sought_where_they_rested_in_the_search(found, monkeypatch):
+    best, _ = found
+    assert best.rested["wetter"].drawn, "the design that was found stood, and where is known"
+    known = []
+
+    def judged(shell, design, asked, **how):
+        known.append(how["before"])
+        return judge_trial(shell, design, asked, **how)
+
+    monkeypatch.setattr(trials, "judge_trial", judged)
+    sf.polish(best, evaluations=4)
+    assert known[0] is best.rested
+
+
 def test_where_no_polished_design_stands_the_design_before_it_comes_back(found, monkeypatch):
     best, _ = found
 
