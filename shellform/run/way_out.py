@@ -27,6 +27,7 @@ BUILDABLE = "buildable"  # folder in a run's
 COVERED = 3.0  # spacings: a radius of curvature that nets cover
 MORE = (1.0, 1.5, 2.2)  # times the radius asked for
 _SLENDER = 1e-9  # m: less is no change
+_FAR_OFF = 0.2  # of a surface's height, in the mean
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,8 @@ def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:
     write_values(folder / "change.vtu", found.surface, {"change [m]": found.change})
     most = int(np.argmax(found.change))
     place = f"{coordinates(found.before.vertices[most])} m"
-    off = f"{number(float(found.change[most]))} m off at most, at {place}, {number(float(found.change.mean()), 2)} m in the mean"
+    mean = float(found.change.mean())
+    off = f"{number(float(found.change[most]))} m off at most, at {place}, {number(mean, 2)} m in the mean"
     plan_map(
         folder / "change.png",
         found.surface.vertices[:, :2],
@@ -114,7 +116,16 @@ def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:
     return (
         f"The nearest surface with which this goes on is {folder / SURFACE}{cad} (in metres"
         f"{f', with {options}' if options else ''}): creases rounded to "
-        f"{radius:.3g} m, {off} (change.png)"
+        f"{radius:.3g} m, {off}{_another(mean, found.before)} (change.png)"
+    )
+
+
+def _another(mean: float, before: Surface) -> str:
+    """What else is said of a surface that lies so far, m, off the one that was drawn that it is hardly its
+    shape."""
+    share = mean / float(before.size[2])
+    return (
+        f", {100.0 * share:.0f} % of its height: hardly the shape that was drawn" if share > _FAR_OFF else ""
     )
 
 

@@ -11,7 +11,7 @@ import shellform as sf
 from shellform.errors import InputError, NotConverged
 from shellform.net.refusal import NoNet, Stalled
 from shellform.records.progress import unheard
-from shellform.run import first_refusal
+from shellform.run import first_refusal, way_out
 from shellform.run.first_design import first_design
 from shellform.run.first_look import net_alone
 from shellform.run.first_net import Allowance
@@ -22,6 +22,7 @@ from shellform.run.sizes import MOST_CROSSINGS, DesignWish
 from shellform.run.unbuildable import Unbuildable, Why
 from shellform.run.way_out import with_way_out
 from shellform.surface.readers.reading import read_surface
+from shellform.surface.shape.fairing import Faired
 from tests.run.test_propose import as_obj
 from tests.surface.test_fairing import gable, sheet
 
@@ -53,6 +54,23 @@ def test_a_crease_that_no_net_covers_is_rounded_and_the_net_goes_on(tmp_path):
     cad = file.with_suffix(".step")
     if cad.exists():
         assert read_surface(cad).area == pytest.approx(read_surface(file).area, rel=0.01)
+
+
+@pytest.mark.parametrize(("mean", "said"), [(0.19, False), (0.21, True)])
+def test_a_rounded_surface_far_off_the_drawn_one_is_said_to_be_hardly_its_shape(
+    tmp_path, monkeypatch, mean, said
+):
+    surface = sheet(gable)
+    height = float(surface.size[2])
+
+    def far(surface, radius):
+        return Faired(surface, surface, np.full(len(surface.vertices), mean * height))
+
+    monkeypatch.setattr(way_out, "faired", far)
+    refusal = InputError("is no shell", where="surface")
+    told = with_way_out(refusal, surface, 3.0, tmp_path / "out", lambda surface: None, unheard)
+    assert (": hardly the shape that was drawn (change.png)" in told.remedy) == said
+    assert ("in the mean, 21 % of its height" in told.remedy) == said
 
 
 def test_a_refusal_stays_as_it_was_where_rounding_helps_nothing(tmp_path):
