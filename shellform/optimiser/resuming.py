@@ -91,7 +91,7 @@ def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
         )
     )
     began = search.began - checkpoint.history[-1].seconds
-    rested = {name: _rested(arrays, name, drawn) for name, drawn in numbers["rested"].items()}
+    rested = {name: _rested(arrays, name, drawn) for name, drawn in numbers.get("rested", {}).items()}
     it = Iterate(
         point, before, tuple(checkpoint.history), mind=mind, remembered=remembered, rested=rested, **kept
     )

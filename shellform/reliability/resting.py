@@ -1,6 +1,8 @@
-"""Where structures rest under a load in one design, from where a search takes them along to the next one: of
-designs side by side each structure rests side by side too, at the end of its own branch, while from the
-perfect structure's place supports that are off lead to where its tangent isn't positive definite."""
+"""Where structures rest under a load in one design, from where a search takes them along to the next one. In
+designs side by side a structure rests side by side too, while from the perfect structure's place supports
+that are off lead to where its tangent isn't positive definite. It may have come to rest in more than one
+place: which of them it keeps to is no matter to whether it stands.
+"""
 
 from __future__ import annotations
 
