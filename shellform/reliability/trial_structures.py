@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 
+from shellform.arrays import Record
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.reliability.drawing import PERFECT, draw_errors
@@ -35,8 +36,8 @@ _AT_ONCE = 4  # structures between two looks at how many have fallen
 _RESOLUTION = 1 / 32  # of the largest load, to which it is known where a structure falls
 
 
-@dataclass(frozen=True)
-class JudgedTrial:
+@dataclass(frozen=True, eq=False)
+class JudgedTrial(Record):
     """Numbers of the structures that have `fallen` under each load as far as it took to say whether the
     design `stands`, whether the perfect one keeps its `critical` factor, the `factorisations` spent, and the
     `factors` of the largest load on the design load's path that structures bear. Where structures `rested`
