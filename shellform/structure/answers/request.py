@@ -12,6 +12,10 @@ from shellform.structure.model import Model
 from shellform.structure.network import Network
 
 _MOST = 1_000_000  # increments: of the smallest structure they take 15 minutes
+_SMALLEST, _LARGEST = (
+    1e-12,
+    1e12,
+)  # of factors and ways: what is beyond drowns in rounding, or drowns all else
 METHODS = ("relaxation", "dynamic", "newton", "path")
 
 
@@ -30,6 +34,7 @@ def check_request(
     """Raises InputError for numbers, methods and leads that make no sense on so many nodes."""
     require_count(increments, where="--increments", give="a number of load steps, such as 10", most=_MOST)
     require_number(factor, where="--factor", give="a factor of the load, such as 1")
+    _check_size(factor, "--factor")
     if not 0.0 < tolerance < 1.0:
         raise InputError(
             "must be between 0 and 1", where="--tolerance", value=tolerance, remedy="For example 1e-9."
@@ -45,6 +50,7 @@ def check_request(
                 where="--critical",
                 remedy="Give a factor of the load other than 0, such as 3.",
             )
+        _check_size(critical_to, "--critical")
     if lead is not None and method != "path":
         raise InputError(
             "leads a path, and none is followed",
@@ -57,13 +63,24 @@ def check_request(
         and 0 <= lead[0] < node_count
         and lead[1] in (0, 1, 2)
         and np.isfinite(lead[2])
-        and lead[2] != 0.0
+        and _SMALLEST <= abs(lead[2]) <= _LARGEST
     ):
         raise InputError(
-            "must be a node, an axis 0 to 2 and a displacement other than 0",
+            f"must be a node, an axis 0 to 2 and a displacement of {_SMALLEST:g} to {_LARGEST:g} m either way",
             where="--lead",
             value=lead,
             remedy=f"For example {node_count // 2}:z:-0.05, of nodes from 0 to {node_count - 1}.",
+        )
+
+
+def _check_size(factor: float, where: str) -> None:
+    """Raises InputError for a load factor other than 0 of a size that no analysis is made for."""
+    if factor != 0.0 and not _SMALLEST <= abs(factor) <= _LARGEST:
+        raise InputError(
+            f"must be between {_SMALLEST:g} and {_LARGEST:g} in size",
+            where=where,
+            value=factor,
+            remedy="Give a factor such as 3, and forces in newtons in the load case.",
         )
 
 
