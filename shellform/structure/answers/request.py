@@ -12,10 +12,8 @@ from shellform.structure.model import Model
 from shellform.structure.network import Network
 
 _MOST = 1_000_000  # increments: of the smallest structure they take 15 minutes
-_SMALLEST, _LARGEST = (
-    1e-12,
-    1e12,
-)  # of factors and ways: what is beyond drowns in rounding, or drowns all else
+# of factors and ways: products of larger ones overflow, as of forces, which models refuse (refusals.py)
+_SMALLEST, _LARGEST = 1e-30, 1e30
 METHODS = ("relaxation", "dynamic", "newton", "path")
 
 
