@@ -14,7 +14,6 @@ from shellform.optimiser.optimum import Checkpoint, arrays_of, states_of
 from shellform.optimiser.search_state import Accepted, Iterate, Search, aimed, kept_in_mind
 from shellform.problem.evaluation import COUNTS
 from shellform.reliability.resting import Resting
-from shellform.structure.elements.state import State
 
 _ARRAYS = ("tensioned", "excess", "needed")
 _PERFECT = "perfect"
@@ -45,7 +44,8 @@ def tell(search: Search, it: Iterate) -> None:
     arrays |= arrays_of(it.point.states)
     numbers["rested"] = {name: list(own.drawn) for name, own in it.rested.items()}
     for name, own in it.rested.items():
-        arrays |= arrays_of({_PERFECT: own.perfect, **_by_text(own.drawn)}, _prefix(name))
+        drawn = {str(number): state for number, state in own.drawn.items()}
+        arrays |= arrays_of({_PERFECT: own.perfect, **drawn}, _prefix(name))
     numbers["radius"], numbers["mind"] = design.radius, {}
     if it.mind is not None and it.remembered is not None:
         numbers["mind"] = {str(each.number): each.least for each in it.mind.scenarios}
@@ -101,10 +101,6 @@ def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
 def _rested(arrays: Mapping[str, np.ndarray], load: str, drawn: Sequence[int]) -> Resting:
     found = states_of(arrays, [_PERFECT, *map(str, drawn)], _prefix(load))
     return Resting(found[_PERFECT], {number: found[str(number)] for number in drawn})
-
-
-def _by_text(drawn: Mapping[int, State]) -> dict[str, State]:
-    return {str(number): state for number, state in drawn.items()}
 
 
 def _prefix(load: str) -> str:

@@ -51,7 +51,7 @@ def narrow_holes(
     builder scripts, whose openings are meant."""
     if file.suffix.lower() == ".py" or "fill_narrower" in options or options.get("fill") in ("holes", "all"):
         return None
-    if len(surface.boundary) < 2:
+    if len(surface.boundary) < 2:  # the outer edge alone
         return None
     width = first_spacing(surface)[0] if spacing is None else spacing
     found = openings_of(surface.vertices, surface.boundary, options.get("ground"))

@@ -19,7 +19,7 @@ from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Draft, noted
 from shellform.surface.shape.plate import bent_heights
-from shellform.surface.shape.target import ON_GROUND, closed_loops, make_surface
+from shellform.surface.shape.target import ON_GROUND, closed_loops, length_round, make_surface
 from shellform.surface.shape.triangles import area_vectors, open_edges
 
 _DESCENT = 1.0  # mean slope of a fill down to the ground
@@ -109,8 +109,7 @@ class Openings(Record):
 def openings_of(points: Reals, loops: Sequence[Indices], ground: float | None) -> Openings:
     """The openings of a surface whose edges are these `loops`, the longest of them the outer one; the
     `ground`'s level, m (None: the outer edge's lowest point)."""
-    outline = [float(np.linalg.norm(points[loop] - points[np.roll(loop, 1)], axis=1).sum()) for loop in loops]
-    outer = loops[int(np.argmax(outline))]
+    outer = max(loops, key=lambda loop: length_round(points[loop]))
     level = float(points[outer, 2].min()) if ground is None else ground
     low = points[:, 2] <= level + ON_GROUND * (float(points[:, 2].max()) - level)
     holes = tuple(loop for loop in loops if loop is not outer and not low[loop].any())

@@ -74,7 +74,7 @@ class Surface(Record):
         across = across_edges(self.triangles, len(self.vertices))
         at = np.argwhere(across < 0)
         rim = np.column_stack([self.triangles[at[:, 0], (at[:, 1] + k) % 3] for k in (0, 1)])
-        loops = sorted(closed_loops(rim), key=lambda loop: -_length(self.vertices[loop]))
+        loops = sorted(closed_loops(rim), key=lambda loop: -length_round(self.vertices[loop]))
         return tuple(indices("boundary", loop, (None,), below=len(self.vertices)) for loop in loops)
 
     @cached_property
@@ -313,7 +313,8 @@ def _distinct(rows: Indices) -> tuple[Indices, Indices]:
     return order[new], kind
 
 
-def _length(loop: Reals) -> float:
+def length_round(loop: Reals) -> float:
+    """How long a closed line through points (n, 3) is, m."""
     return float(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).sum())
 
 
