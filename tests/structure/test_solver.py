@@ -1,6 +1,8 @@
 """Rotations, factorisation, equilibrium and loading."""
 
+import gc
 import threading
+import weakref
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -19,7 +21,7 @@ from shellform.structure.elements.state import at_rest
 from shellform.structure.network import Network, assemble
 from shellform.structure.solve import factorisation
 from shellform.structure.solve.equilibrium import LostBranch, find_equilibrium, newton
-from shellform.structure.solve.factorisation import NotPositiveDefinite
+from shellform.structure.solve.factorisation import NotPositiveDefinite, Symmetric, installed
 from shellform.structure.solve.loading import apply_load
 from shellform.structure.solve.residual import held
 from shellform.verification.models import CLAMP, chain, line, load_at, no_cables
@@ -363,3 +365,24 @@ def test_the_factor_at_hand_serves_for_the_same_values_until_others_were_factori
     with pytest.raises(factorisation.NotPositiveDefinite):
         matrix.factor(-values)
     np.testing.assert_allclose(random_matrix(20.0) @ matrix.factor(values).solve(right), right, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", installed())
+def test_a_family_that_nobody_needs_is_let_go_of_at_once_with_its_factor(name, monkeypatch):
+    """A circle of references would keep factors, half a gigabyte each of a large shell, until garbage is
+    searched for."""
+    monkeypatch.setenv("SHELLFORM_SOLVER", name)
+    gc.disable()
+    try:
+        family = Symmetric(np.array([0, 2, 3]), np.array([0, 1, 1]))
+        factor = family.factor(np.array([2.0, 1.0, 2.0]))
+        gone = weakref.ref(family), weakref.ref(factor)
+        del family, factor
+        assert [each() for each in gone] == [None, None]
+    finally:
+        gc.enable()
+
+
+def test_a_factor_serves_on_without_its_family():
+    factor = Symmetric(np.array([0, 2, 3]), np.array([0, 1, 1])).factor(np.array([2.0, 1.0, 2.0]))
+    np.testing.assert_allclose(factor.solve(np.array([3.0, 3.0])), 1.0)

@@ -23,11 +23,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from shellform.arrays import Indices, Reals, Record
-from shellform.compiled import njit
+from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.structure.solve import pardiso
 from shellform.structure.solve.addresses import has_room, take_work_areas
+from shellform.structure.solve.thin import Thin
 from shellform.work_clock import Work, counts_as
 
 try:
@@ -41,7 +41,7 @@ if cholmod is not None and not has_room(_BLAS):
     cholmod = None
 
 _FEW = 64  # values
-COLUMNS = 256  # solved for at once where there are thousands: 100 MB at 50,000 degrees of freedom
+_FEWEST_COLUMNS, _MOST_COLUMNS, _ROOM = 64, 256, 2**24  # solved for at once, and the entries that they have
 _SUPERNODAL, _SIMPLICIAL = 2, 0  # values of CHOLMOD's option: L L' by blocks, L D L' column by column
 _CHOLMOD = threading.Lock()  # held while the option must stay as it was set
 
@@ -52,6 +52,11 @@ def installed() -> list[str]:
     """The solvers there are, the fastest first."""
     there = {"mkl": pardiso.library() is not None, "cholmod": cholmod is not None, "superlu": True}
     return [name for name, here in there.items() if here]
+
+
+def columns_at_once(size: int) -> int:
+    """How many right-hand sides of a `size` are solved for at once where there are thousands: some 130 MB."""
+    return max(min(_ROOM // max(size, 1), _MOST_COLUMNS), _FEWEST_COLUMNS)
 
 
 def backend() -> str:
@@ -111,7 +116,7 @@ class Symmetric:
         self._condensed: tuple[Indices, pardiso.Factoriser] | None = None
         self._symbolic: Any = None
         self._matrix: Any = None
-        self._generation = 0
+        self._latest = _Latest()
         self._last: tuple[Reals, Factor] | None = None
 
     def factor(self, values: Reals) -> Factor:
@@ -138,7 +143,7 @@ class Symmetric:
             return self._factor_with_pardiso(values)
         if self._backend == "superlu":
             return _SuperLU(self.full(values))
-        self._generation += 1
+        self._latest.number += 1
         try:
             with _CHOLMOD:
                 if self._symbolic is None:
@@ -149,17 +154,17 @@ class Symmetric:
                 cholmod.numeric(self._matrix, self._symbolic)
         except ArithmeticError as error:
             raise NotPositiveDefinite("the matrix is not positive definite") from error
-        return _Cholmod(self, self._symbolic, self._generation)
+        return _Cholmod(self._latest, self._symbolic)
 
     def _factor_with_pardiso(self, values: Reals) -> Factor:
         if self._pardiso is None:
             self._pardiso = pardiso.Factoriser(self.indptr, self.indices)
-        self._generation += 1
+        self._latest.number += 1
         try:
             self._pardiso.factor(values)
         except pardiso.NotDefinite as error:
             raise NotPositiveDefinite("the matrix is not positive definite") from error
-        return _Pardiso(self, self._pardiso, self._generation)
+        return _Pardiso(self._latest, self._pardiso)
 
     @counts_as(Work.FACTORISATIONS)
     def solve_kept(self, values: Reals, kept: Indices, right: Reals) -> Reals | None:
@@ -191,7 +196,7 @@ class Symmetric:
         order = matrix(np.arange(float(self.size)))
         cholmod.solve(symbolic, order, sys=7)
         starts, rows, entries = (np.array(each)[:, 0] for each in cholmod.getfactor(symbolic).CCS)
-        return _Thin(np.array(order)[:, 0].astype(np.int64), starts, rows, entries)
+        return Thin(np.array(order)[:, 0].astype(np.int64), starts, rows, entries)
 
     @counts_as(Work.FACTORISATIONS)
     def factor_indefinite(self, values: Reals) -> Indefinite:
@@ -203,10 +208,10 @@ class Symmetric:
         if self._backend == "mkl":
             if self._bunch_kaufman is None:
                 self._bunch_kaufman = pardiso.Factoriser(self.indptr, self.indices, definite=False)
-            self._generation += 1
+            self._latest.number += 1
             self._last = None
             self._bunch_kaufman.factor(values)
-            return _Pardiso(self, self._bunch_kaufman, self._generation)
+            return _Pardiso(self._latest, self._bunch_kaufman)
         if self._backend == "superlu":
             return _SuperLU(self.full(values), definite=False)
         try:
@@ -269,10 +274,6 @@ class Symmetric:
         rows, columns = matrix(self.indices.astype(np.int64)), matrix(self.columns)
         return spmatrix(matrix(values), rows, columns, (self.size, self.size))
 
-    def _check(self, generation: int) -> None:
-        if generation != self._generation:
-            raise RuntimeError("this factor was replaced by a later factorisation of the same family")
-
     def full(self, values: Reals) -> sp.csc_array:
         """The whole matrix (n, n) with lower `values` (nnz,); its pattern is shared, not to be changed."""
         indptr, indices, sources = self._both_triangles
@@ -288,28 +289,48 @@ class Symmetric:
         return both.indptr, both.indices, both.data - 1
 
 
-class _Pardiso:
-    """A factor by PARDISO, good until its family makes another."""
+class _Latest:
+    """The `number` of the last factor that a family has made. Factors know it and not their family: a circle
+    of references would keep them, half a gigabyte each of a large shell, until garbage is searched for."""
 
-    def __init__(self, family: Symmetric, factor: pardiso.Factoriser, generation: int) -> None:
-        self._family, self._factor, self._generation = family, factor, generation
-        self.negative = factor.negative
+    def __init__(self) -> None:
+        self.number = 0
+
+
+class _Replaced:
+    """A factor that is good until its family makes another, the latest when it is made."""
+
+    def __init__(self, latest: _Latest) -> None:
+        self._latest, self._number = latest, latest.number
+
+    def _check(self) -> None:
+        if self._number != self._latest.number:
+            raise RuntimeError("this factor was replaced by a later factorisation of the same family")
+
+
+class _Pardiso(_Replaced):
+    """A factor by PARDISO."""
+
+    def __init__(self, latest: _Latest, factor: pardiso.Factoriser) -> None:
+        super().__init__(latest)
+        self._factor, self.negative = factor, factor.negative
 
     @counts_as(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
-        self._family._check(self._generation)
+        self._check()
         return self._factor.solve(right)
 
 
-class _Cholmod:
-    """A factor by CHOLMOD, good until its family makes another."""
+class _Cholmod(_Replaced):
+    """A factor by CHOLMOD."""
 
-    def __init__(self, family: Symmetric, factor: Any, generation: int) -> None:
-        self._family, self._factor, self._generation = family, factor, generation
+    def __init__(self, latest: _Latest, factor: Any) -> None:
+        super().__init__(latest)
+        self._factor = factor
 
     @counts_as(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
-        self._family._check(self._generation)
+        self._check()
         return _by_cholmod(self._factor, right)
 
 
@@ -331,48 +352,6 @@ def _by_cholmod(factor: Any, right: Reals) -> Reals:
     cholmod.solve(factor, solution)
     result = np.array(solution)
     return result[:, 0] if right.ndim == 1 else result
-
-
-@dataclass(frozen=True, eq=False)
-class _Thin(Record):
-    """P A P' = L D L': `order` of the rows, L by columns with D on its diagonal, which comes first."""
-
-    order: Indices
-    starts: Indices
-    rows: Indices
-    entries: Reals
-
-    @counts_as(Work.SUBSTITUTIONS)
-    def solve(self, right: Reals) -> Reals:
-        columns = right[:, None] if right.ndim == 1 else right
-        solution = np.asarray(
-            _solve(self.order, self.starts, self.rows, self.entries, np.ascontiguousarray(columns))
-        )
-        return solution[:, 0] if right.ndim == 1 else solution
-
-
-@njit(cache=True)
-def _solve(order, starts, rows, entries, right):  # type: ignore[no-untyped-def]
-    size, sides = right.shape
-    x = np.empty((size, sides))
-    for i in range(size):
-        for c in range(sides):
-            x[i, c] = right[order[i], c]
-    for j in range(size):
-        for k in range(starts[j] + 1, starts[j + 1]):
-            for c in range(sides):
-                x[rows[k], c] -= entries[k] * x[j, c]
-    for j in range(size - 1, -1, -1):
-        for c in range(sides):
-            x[j, c] /= entries[starts[j]]
-        for k in range(starts[j] + 1, starts[j + 1]):
-            for c in range(sides):
-                x[j, c] -= entries[k] * x[rows[k], c]
-    result = np.empty((size, sides))
-    for i in range(size):
-        for c in range(sides):
-            result[order[i], c] = x[i, c]
-    return result
 
 
 class _SuperLU:
