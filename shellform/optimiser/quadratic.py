@@ -3,13 +3,14 @@
 Its linear systems are condensed to the variables, so that constraints cost little. Where the curvature is L
 L' with few columns, they are condensed further, to those and the constraints: M = D + L L' + G' W G with
 diagonal D and W is solved with by Sherman, Morrison and Woodbury's formula, whose cost is linear in the
-variables.
+variables. Of thousands of these parts are worked on side by side, and summed in order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,15 @@ from cvxopt import matrix, solvers
 from scipy.linalg import cho_factor, cho_solve
 
 from shellform.arrays import Reals, Record
+from shellform.structure.elements.threads import side_by_side
 from shellform.work_clock import Work, counts_as
 
 _REGULAR = 1e-8  # of the mean curvature, where the model has none
 _CORRECTIONS = 2  # of what a small diagonal costs the formula in digits
 _EXACT = 1e-12  # of the right side, below which nothing is left to correct
 
+_PART = 4096  # variables
+_QUIETLY = partial(np.errstate, over="ignore", invalid="ignore")
 _Linear = Callable[[Reals], Reals]
 # from the bounds' weights (s,) and the constraints' (k,) to the solution of the condensed system
 _Condensed = Callable[[Reals, Reals], _Linear]
@@ -84,7 +88,7 @@ def minimise_quadratic(
     right = np.concatenate([upper, -lower, -values])
     dims = {"l": len(right), "q": [], "s": []}
     try:
-        with np.errstate(over="ignore", invalid="ignore"):
+        with _QUIETLY():
             answer = solvers.coneqp(
                 products(curved),
                 matrix(slope),
@@ -127,23 +131,43 @@ def _low_rank(hessian: LowRank, rows: Reals) -> tuple[_Linear, _Condensed]:
     few = np.hstack([hessian.columns, rows.T])
     count, size = hessian.columns.shape[1], len(hessian.columns)
     regular = _REGULAR * max(float((hessian.columns**2).sum()) / size, 1e-300)
+    parts = [slice(first, first + _PART) for first in range(0, size, _PART)]
+
+    def of_parts(of: Callable[[slice], Reals]) -> list[Reals]:
+        def quietly(own: slice) -> Reals:  # each thread has its own state of warnings
+            with _QUIETLY():
+                return of(own)
+
+        return side_by_side(quietly, parts)
+
+    def summed(of: Callable[[slice], Reals]) -> Reals:
+        return np.asarray(sum(of_parts(of)))
+
+    def joined(of: Callable[[slice], Reals]) -> Reals:
+        return np.concatenate(of_parts(of))
 
     def condensed(of_bounds: Reals, of_rows: Reals) -> _Linear:
         diagonal = regular + of_bounds
         root, stiff = np.sqrt(diagonal), np.append(np.ones(count), of_rows)
-        scaled = few / root[:, None]
-        middle = scaled.T @ scaled  # of the same array: half the products
+        scaled = np.empty_like(few)
+
+        def squared(own: slice) -> Reals:
+            part = scaled[own]
+            np.divide(few[own], root[own, None], out=part)
+            return np.asarray(part.T @ part)  # of the same array: half the products
+
+        middle = summed(squared)
         middle[np.diag_indices(few.shape[1])] += 1.0 / stiff
         factor = cho_factor(middle, check_finite=False)
 
         def near(right: Reals) -> Reals:
             plain = right / root
-            return np.asarray(
-                (plain - scaled @ cho_solve(factor, scaled.T @ plain, check_finite=False)) / root
-            )
+            inner = cho_solve(factor, summed(lambda own: scaled[own].T @ plain[own]), check_finite=False)
+            return joined(lambda own: (plain[own] - scaled[own] @ inner) / root[own])
 
         def left_of(right: Reals, x: Reals) -> Reals:
-            return np.asarray(right - diagonal * x - few @ (stiff * (few.T @ x)))
+            inner = stiff * summed(lambda own: few[own].T @ x[own])
+            return joined(lambda own: right[own] - diagonal[own] * x[own] - few[own] @ inner)
 
         def solved(right: Reals) -> Reals:
             found = near(right)
