@@ -1,4 +1,5 @@
-"""Cables alike: those that a symmetry of the net maps onto each other, and the fewest lengths to cut them to.
+"""Cables alike: those that a symmetry of the net maps onto each other, neighbours along one diagonal, and the
+fewest lengths to cut cables to.
 
 A symmetry is a mirror or a half turn of the plan about the middle of the joints under which every candidate
 cable lies on another one. Cables that symmetries join are a group, of which every member gets the same rest
@@ -22,6 +23,7 @@ from shellform.gridshell.gridshell import Gridshell
 
 _SYMMETRIES = ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))  # signs of x and y in two mirrors and the half turn
 _TOLERANCE = 0.02  # of the spacing, within which a cable's middle has to lie on its image's
+_PATCH = 4  # cells of a patch along each direction of rods
 
 
 def symmetric_groups(shell: Gridshell) -> Indices:
@@ -49,6 +51,18 @@ def symmetric_groups(shell: Gridshell) -> Indices:
     pairs = np.vstack(joined)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def patches(shell: Gridshell) -> Indices:
+    """A number (c,) for every candidate cable, the same for those along one diagonal of the cells of a patch,
+    some sixteen cables."""
+    grid = shell.net.grid
+    place = np.zeros((shell.node_count, 2), dtype=np.int64)
+    place[grid.crossing_nodes] = grid.lattice[:, None]
+    first, second = place[shell.cable_ends[:, 0]], place[shell.cable_ends[:, 1]]
+    rising = (second - first).prod(axis=1) > 0
+    patch = np.column_stack([np.minimum(first, second) // _PATCH, rising])
+    return np.asarray(np.unique(patch, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
 
 
 def averaged(values: Reals, groups: Indices, present: Flags) -> Reals:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from shellform.arrays import Flags, Indices
+from shellform.gridshell.grouping import patches
 from shellform.optimiser.agreeing import agreed, leaving_some, pausing
 from shellform.optimiser.descent import climb, descend
 from shellform.optimiser.going_back import last_confirmed, last_sound, last_standing
@@ -39,7 +40,7 @@ from shellform.optimiser.search_state import (
     violation,
 )
 from shellform.optimiser.step_model import StepModel
-from shellform.optimiser.thinning import Budget, allowed, kept_stiffness, removable
+from shellform.optimiser.thinning import Budget, allowed, evenly, kept_stiffness, removable
 from shellform.optimiser.trials import (
     accepted,
     attempt,
@@ -296,19 +297,26 @@ def _repaired(search: Search, it: Iterate, trial: Evaluated) -> tuple[Evaluated,
 
 
 def _leaving(search: Search, it: Iterate, model: StepModel) -> Indices:
-    """Taut cables, numbered among those present, that can go at once, from the one with the least use."""
+    """Taut cables, numbered among those present, that can go at once, from the one with the least use; of
+    many evenly all over the shell."""
+    solver, shell, design = search.solver, search.problem.shell, it.point.design
     state = it.point.states[search.evaluator.problem.decisive_load()]
-    cables = search.problem.shell.cables(it.point.design)
     pull = model.origin[: model.tensions]
-    some = np.arange(len(pull))
-    if len(pull) > search.solver.many:  # those that pull least
+    some, patch, most = np.arange(len(pull)), None, min(it.batch, solver.largest)
+    if len(pull) > solver.many:
+        patch = patches(shell)[design.present]
         free = np.flatnonzero((pull > 0.0) & ~it.needed)
-        some = np.sort(free[np.argsort(pull[free], kind="stable")[: search.solver.candidates]])
-    kept = kept_stiffness(model.assembly, state, cables, some)
+        share = pull[free] / pull[free].sum()
+        some = np.sort(free[evenly(share, share, patch[free])[: max(solver.candidates, most)]])
+    kept = kept_stiffness(model.assembly, state, shell.cables(design), some)
     loss = 1.0 - np.diag(kept)
-    pull = pull[some]
-    score = loss / loss.sum() + pull / pull.sum()
+    share = pull[some] / pull[some].sum()
+    use = loss / loss.sum() + share
     if it.mind is not None:
-        score += missed_without(search, it, model)[some]
-    free = np.flatnonzero((pull > 0.0) & ~it.needed[some])
-    return some[removable(kept, free[np.argsort(score[free], kind="stable")], it.batch, search.solver.kept)]
+        use += missed_without(search, it, model)[some]
+    free = np.flatnonzero((share > 0.0) & ~it.needed[some])
+    if patch is None:
+        order = np.argsort(use[free], kind="stable")
+    else:
+        order = evenly(use[free], share[free], patch[some[free]])
+    return some[removable(kept, free[order], most, solver.kept)]

@@ -82,7 +82,8 @@ class SequentialConvex:
     Thinning:
     - `batch`: the first batch takes one in so many of the cables in tension; after it they grow by a third
       while they fit and are cut to a third where not.
-    - `candidates`: of thousands of cables, those that are looked at for a batch.
+    - `candidates`: of thousands of cables, those that are looked at for a batch, or as many as it takes.
+    - `largest`: cables that a batch takes at most.
     - `kept`: of the stiffness in any direction at the decisive load, that a batch must leave: the others'
       lengths are to make up for the rest. It only keeps trials from failing for nothing: what a design has to
       bear, its constraints and structures as built decide, and of stiff strands each holds most of its
@@ -131,6 +132,7 @@ class SequentialConvex:
 
     batch: int = 8
     candidates: int = 1024
+    largest: int = 4096
     kept: float = 0.1
     allowance: float = 0.08
     failures: int = 6

@@ -10,6 +10,11 @@ does, B being the cables' directions and k = EA/l0. One block solve gives S for 
 what the structure keeps of its stiffness along each cable when that one goes, small numbers belonging to
 cables that hold the softest mode. Sets are chosen greedily by a Cholesky factor of S that grows row by row
 and may not lose more than a set share. What they may cost is a budget: of the objective, and of the shape.
+
+Of thousands of cables a batch takes hundreds at once, and what these pull has to be in balance without them:
+with the least used ones of the whole shell those along one diagonal of one region went together, which
+sheared it. So of each patch of cells either diagonal gives as much pull as the others do, where those are
+used as much.
 """
 
 from __future__ import annotations
@@ -74,6 +79,19 @@ def kept_stiffness(
         own = slice(first, min(first + step, len(kept)))
         kept[:, own] -= pull.T @ factor.solve(np.asfortranarray(pull[:, own].toarray()))
     return kept
+
+
+def evenly(use: Reals, pull: Reals, patch: Indices) -> Indices:
+    """The order (c,) in which cables go that `pull` so much, of which so much `use` is made, both as shares
+    of all, numbered by the `patch` that each belongs to: as if what those of its patch pull that go before it
+    were made of it too."""
+    order = np.lexsort((use, patch))
+    own, pulled = patch[order], np.cumsum(pull[order]) - pull[order]
+    begins = np.flatnonzero(np.append(True, own[1:] != own[:-1]))
+    counts = np.diff(np.append(begins, len(own)))
+    before = np.empty(len(order))
+    before[order] = pulled - np.repeat(pulled[begins], counts)
+    return np.argsort(use + before, kind="stable")
 
 
 def removable(kept: Reals, order: Indices, most: int, least: float) -> Indices:

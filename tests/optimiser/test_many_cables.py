@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import shellform as sf
+from shellform.gridshell.grouping import patches
+from shellform.optimiser import quadratic
 from shellform.optimiser.guards import SolvedGuard, solved_guard, whole_guard
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.phases import _leaving
@@ -13,9 +15,10 @@ from shellform.optimiser.proposal import _let_fall, propose
 from shellform.optimiser.quadratic import LowRank, _low_rank, minimise_quadratic
 from shellform.optimiser.solved_answers import SolvedAnswers
 from shellform.optimiser.step_model import step_model
-from shellform.optimiser.thinning import kept_stiffness
+from shellform.optimiser.thinning import evenly, kept_stiffness
 from shellform.optimiser.trials import task
 from shellform.structure.answers.sensitivity import element_columns
+from shellform.structure.elements import threads
 from shellform.structure.elements.eased_cables import EasedCables
 
 
@@ -200,15 +203,39 @@ def test_what_cables_keep_of_the_stiffness_is_the_same_of_some(shell):
     )
 
 
-def test_of_thousands_of_cables_those_that_pull_least_may_leave(shell):
+def test_of_thousands_of_cables_each_patch_gives_of_those_that_pull_least_in_it(shell):
     search, it = searched(shell)
-    search = replace(search, solver=replace(search.solver, candidates=6))
-    it = replace(it, batch=4, needed=np.zeros(len(it.tensioned), dtype=bool))
+    it = replace(it, batch=6, needed=np.zeros(len(it.tensioned), dtype=bool))
+    search = replace(search, solver=replace(search.solver, candidates=6, kept=0.0))
     model = search.models.at(it.point)
     leaving = _leaving(search, it, model)
     pull = model.origin[: model.tensions]
-    assert 0 < len(leaving) <= 4
-    assert (pull[leaving] <= np.sort(pull[pull > 0.0])[5]).all()
+    patch = patches(shell)[it.point.design.present]
+    assert len(leaving) == 6
+    order = evenly(pull, pull, patch)
+    assert sorted(leaving) == sorted(order[pull[order] > 0.0][:6])
+
+
+def test_patches_are_of_one_diagonal_in_four_by_four_cells(shell):
+    patch = patches(shell)
+    way = np.diff(shell.net.grid.flat[shell.cable_ends], axis=1)[:, 0]
+    middle = shell.target.positions[shell.cable_ends].mean(axis=1)
+    for number in np.unique(patch):
+        own = patch == number
+        assert own.sum() <= 16
+        along = way[own] / np.linalg.norm(way[own], axis=1)[:, None]
+        assert np.abs(along @ along.T).min() > 0.7, "the other diagonal lies across"
+        assert np.ptp(middle[own], axis=0).max() < 4.0 * np.sqrt(2.0) * shell.net.spacing
+    assert np.bincount(patch).max() > 4
+
+
+def test_of_cables_used_alike_patches_give_alike_and_more_where_they_are_used_less():
+    patch, alike = np.repeat([3, 8, 1], 4), np.full(12, 1.0 / 12.0)
+    order = evenly(alike, alike, patch)
+    for turn in range(4):
+        assert sorted(patch[order[3 * turn : 3 * turn + 3]]) == [1, 3, 8]
+    less = np.where(patch == 8, 0.02, 0.1)
+    assert patch[evenly(less, less, patch)[:4]].tolist() == [8] * 4
 
 
 def test_a_problem_with_curvature_of_few_columns_is_solved_as_the_dense_one():
@@ -243,3 +270,25 @@ def test_condensed_systems_are_solved_in_full_where_bounds_hardly_weigh():
     found = condensed(bounds, weights)(right)
     left = right - (product(found) + bounds * found + rows.T @ (weights * (rows @ found)))
     assert np.abs(left).max() < 1e-12 * np.abs(right).max()  # 3e-6 by the formula alone
+
+
+def test_thousands_of_variables_are_solved_for_in_parts_alike_on_any_number_of_cores(monkeypatch):
+    rng = np.random.default_rng(5)
+    columns, slope = LowRank(rng.normal(size=(900, 5)) / 30.0), rng.normal(size=900)
+    rows, values = rng.normal(size=(4, 900)) / 30.0, -rng.uniform(0.1, 1.0, 4)
+    asked = columns, slope, rows, values, -np.ones(900), np.ones(900)
+    whole = minimise_quadratic(*asked)
+    monkeypatch.setattr(quadratic, "_PART", 256)
+    monkeypatch.setattr(threads, "cores", lambda: 1)
+    one = minimise_quadratic(*asked)
+    monkeypatch.setattr(threads, "cores", lambda: 3)
+    np.testing.assert_array_equal(minimise_quadratic(*asked), one)
+    np.testing.assert_allclose(one, whole, atol=1e-6)
+
+
+def test_a_problem_in_parts_that_overflows_warns_of_nothing(monkeypatch, recwarn):
+    monkeypatch.setattr(quadratic, "_PART", 1)
+    monkeypatch.setattr(threads, "cores", lambda: 2)
+    few, huge = LowRank(np.ones((2, 1))), np.full(2, 1e300)
+    assert minimise_quadratic(few, huge, np.array([[1e300, 1e300]]), np.ones(1), -huge, huge) is None
+    assert not recwarn.list

@@ -445,36 +445,67 @@ def test_after_a_repair_the_window_is_at_least_a_twentieth_of_a_mean_tension_and
     assert it.window == pytest.approx(after)
 
 
-@pytest.mark.parametrize(
-    ("many", "mind", "some", "order"),
-    [
-        # what is lost of the stiffness without each, and what it pulls, as shares of all
-        (600, None, [0, 1, 2, 3, 4], [3, 0, 2]),
-        # the fourth is missed most by a structure in mind
-        (600, "mind", [0, 1, 2, 3, 4], [0, 2, 3]),
-        # of many only those two are looked at that pull least, the fifth being needed
-        (3, None, [2, 3], [3, 2]),
-        (3, "mind", [2, 3], [2, 3]),
-    ],
-)
-def test_cables_go_by_what_they_hold_and_pull_and_what_structures_in_mind_would_miss(
-    monkeypatch, many, mind, some, order
-):
-    kept = np.array([0.9, 1.0, 0.4, 0.8, 0.8])
+KEPT = np.array([0.9, 1.0, 0.4, 0.8, 0.8])  # of the stiffness without each cable
+PULLS = np.array([3.0, 0.0, 1.0, 2.5, 2.0, 77.0])  # the last one is no tension
+
+
+@pytest.fixture
+def leaving(monkeypatch):
+    """The order in which cables leave that pull so, the fifth of which is needed, and what was asked for it.
+    The third of six candidates isn't present."""
     asked = []
 
     def kept_stiffness(assembly, state, cables, looked):
         asked.append((assembly, state, looked.tolist()))
-        return np.diag(kept[looked])
+        return np.diag(KEPT[looked])
 
     monkeypatch.setattr(phases, "kept_stiffness", kept_stiffness)
     monkeypatch.setattr(
         phases, "removable", lambda kept, order, most, least: asked.append((most, least)) or order
     )
     monkeypatch.setattr(phases, "missed_without", lambda *_: np.array([0.0, 0.0, 0.0, 0.9, 0.0]))
-    model = SimpleNamespace(origin=np.array([4.5, 0.0, 1.0, 2.5, 2.0, 77.0]), tensions=5, assembly="assembly")
-    search = searching(solver=sf.SequentialConvex(many=many, candidates=2, kept=0.15))
-    at = SimpleNamespace(states={"wet": "rest", "wetter": "under more"}, design="design")
-    it = iterate(at, needed=np.arange(5) == 4, batch=3, mind=mind)
-    assert phases._leaving(search, it, model).tolist() == order
-    assert asked == [("assembly", "under more", some), (3, 0.15)]
+    design = Design(np.ones(6), np.array([True, True, False, True, True, True]), 0.1)
+
+    def order(batch, mind, patch=None, **settings):
+        monkeypatch.setattr(phases, "patches", lambda shell: np.array(patch))
+        model = SimpleNamespace(origin=PULLS, tensions=5, assembly="assembly")
+        search = searching(solver=sf.SequentialConvex(candidates=1, kept=0.15, **settings))
+        at = SimpleNamespace(states={"wet": "rest", "wetter": "under more"}, design=design)
+        it = iterate(at, needed=np.arange(5) == 4, batch=batch, mind=mind)
+        return phases._leaving(search, it, model).tolist(), asked
+
+    return order
+
+
+@pytest.mark.parametrize(
+    ("mind", "order"),
+    [
+        # by what is lost of the stiffness without each and what it pulls, as shares of all
+        (None, [0, 3, 2]),
+        # the fourth is missed most by a structure in mind
+        ("mind", [0, 2, 3]),
+    ],
+)
+def test_cables_go_by_what_they_hold_and_pull_and_what_structures_in_mind_would_miss(leaving, mind, order):
+    asked = [("assembly", "under more", [0, 1, 2, 3, 4]), (3, 0.15)]
+    assert leaving(3, mind) == (order, asked)
+
+
+@pytest.mark.parametrize(
+    ("batch", "mind", "patch", "some", "order"),
+    [
+        (3, None, [0, 1, 1, 2, 3, 3], [0, 2, 3], [0, 3, 2]),
+        # the fourth as if what the first pulls, of the same patch, were made of it too
+        (3, None, [0, 1, 1, 7, 0, 3], [0, 2, 3], [0, 2, 3]),
+        (3, "mind", [0, 1, 7, 0, 2, 3], [0, 2, 3], [0, 2, 3]),
+        (2, None, [0, 1, 1, 5, 5, 3], [0, 2], [0, 2]),  # so many are looked at as the batch takes
+    ],
+)
+def test_of_many_cables_patches_give_as_much_pull_as_others_do(leaving, batch, mind, patch, some, order):
+    asked = [("assembly", "under more", some), (batch, 0.15)]
+    assert leaving(batch, mind, patch, many=4) == (order, asked)
+
+
+def test_a_batch_of_many_cables_is_no_larger_than_the_largest(leaving):
+    _, asked = leaving(3, None, [0, 1, 2, 3, 4, 5], many=4, largest=2)
+    assert asked == [("assembly", "under more", [2, 3]), (2, 0.15)]
