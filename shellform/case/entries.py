@@ -344,6 +344,13 @@ class OptimiseEntry(Entry):
         description="distance of a node from its place under the design load, m, beyond which no cable is taken away for it, "
         "and polishing serves the farthest nodes beside all",
     )
+    allowance: float = Field(
+        0.08,
+        ge=0.0,
+        le=1.0,
+        description="what all cables that are taken away may cost together, of the objective, which is 1 at the start: with 1 "
+        "few cables count before the shape, as far as deviation lets them",
+    )
     symmetric: bool = Field(
         False, description="cables that a symmetry of the net joins are polished to one length"
     )

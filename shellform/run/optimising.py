@@ -154,7 +154,10 @@ def _solver(case: Case) -> SequentialConvex | MovingAsymptotes:
     if entry.method == "paper":
         return MovingAsymptotes()
     return SequentialConvex(
-        stiffness=entry.stiffness_min, most_cables=entry.cables_max, deviation=_deviation(case)
+        stiffness=entry.stiffness_min,
+        most_cables=entry.cables_max,
+        deviation=_deviation(case),
+        allowance=entry.allowance,
     )
 
 

@@ -52,6 +52,7 @@ cable_force = 0.3    # w2
 # built_misfit = 0.3 # of the shape as built, with 0.35 for the others: keeps cables that hold structures as built in shape
 misfit_rms_additional = {misfit!r}     # m, constraint (6): the paper's 5 mm × {design.spacing / PAPER_SPACING:.3g}
 deviation = {rounded_up(off)!r}    # m, {why}: beyond it no cable is taken away for shape; limits.deviation requires it{far and f"; {far}"}
+# allowance = 1.0    # of the objective, 1 at the start, that taking cables away may cost in all: fewer cables, with the shape up to that deviation off
 evaluations = {_EVALUATIONS}     # a first answer in minutes; 100 leave fewer cables
 polish = {_POLISHED}
 unloaded = false     # true: make the design without regard to the loads too, to compare with

@@ -359,6 +359,7 @@ def test_a_date_that_is_none_is_refused_with_how_to_write_one(tmp_path):
         ("optimise.rest_length_max=110", "For 110 % write 1.1."),
         ("optimise.misfit=70", "For 70 % write 0.7."),
         ("optimise.stiffness_min=8", "For 8 % write 0.08."),
+        ("optimise.allowance=8", "For 8 % write 0.08."),
         ("safety.probability_design=99", "For 99 % write 0.99."),
         ("safety.probability_design='99'", "For 99 % write 0.99."),
         ("safety.confidence=95", "For 95 % write 0.95."),

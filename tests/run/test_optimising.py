@@ -27,6 +27,7 @@ class Desk:
             "method": "convex",
             "polish": 9,
             "stiffness_min": 0.1,
+            "allowance": 0.3,
         }
         limits = SimpleNamespace(deviation=entries.pop("limit", None))
         self.case = SimpleNamespace(optimise=SimpleNamespace(**{**optimise, **entries}), limits=limits)
@@ -55,6 +56,11 @@ def test_cables_are_saved_within_the_wish_and_the_limit_and_only_a_wish_is_told_
     case = Desk(deviation=wish, limit=limit, method=method).case
     assert optimising._deviation(case) == kept
     assert optimising._wished(case) == wished
+
+
+def test_the_solver_has_what_the_case_says_of_cables_that_go():
+    solver = optimising._solver(Desk(cables_max=7, deviation=0.03).case)
+    assert (solver.most_cables, solver.deviation, solver.stiffness, solver.allowance) == (7, 0.03, 0.1, 0.3)
 
 
 @pytest.mark.parametrize(("most", "kept"), [(3, False), (4, True), (5, True)])
