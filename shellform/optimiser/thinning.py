@@ -87,7 +87,7 @@ def evenly(use: Reals, pull: Reals, patch: Indices) -> Indices:
     were made of it too."""
     order = np.lexsort((use, patch))
     own, pulled = patch[order], np.cumsum(pull[order]) - pull[order]
-    begins = np.flatnonzero(np.append(True, own[1:] != own[:-1]))
+    begins = np.flatnonzero(np.diff(own, prepend=own[:1] - 1))
     counts = np.diff(np.append(begins, len(own)))
     before = np.empty(len(order))
     before[order] = pulled - np.repeat(pulled[begins], counts)

@@ -236,6 +236,8 @@ def test_of_cables_used_alike_patches_give_alike_and_more_where_they_are_used_le
         assert sorted(patch[order[3 * turn : 3 * turn + 3]]) == [1, 3, 8]
     less = np.where(patch == 8, 0.02, 0.1)
     assert patch[evenly(less, less, patch)[:4]].tolist() == [8] * 4
+    none = np.zeros(0)
+    assert evenly(none, none, np.zeros(0, dtype=int)).tolist() == [], "where all are needed"
 
 
 def test_a_problem_with_curvature_of_few_columns_is_solved_as_the_dense_one():
