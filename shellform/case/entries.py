@@ -32,6 +32,7 @@ from shellform.case.sized import (
     Kerf,
     NodeForce,
     RodSize,
+    Share,
     Shear,
     Spacing,
     StockLength,
@@ -292,17 +293,11 @@ class OptimiseEntry(Entry):
         description="convex: models in the cables' tensions, thinned and polished; paper: moving asymptotes directly "
         "in the rest lengths and the radius, nothing else",
     )
-    misfit: float = Field(
-        0.7, ge=0.0, le=1.0, description="share of the misfit in the start value of the objective"
-    )
-    cable_force: float = Field(0.3, ge=0.0, le=1.0, description="share of the sum of cable forces")
-    rod_radius: float = Field(
-        0.0, ge=0.0, le=1.0, description="share of the rod radius; above 0 it is a variable"
-    )
-    built_misfit: float = Field(
+    misfit: Share = Field(0.7, description="share of the misfit in the start value of the objective")
+    cable_force: Share = Field(0.3, description="share of the sum of cable forces")
+    rod_radius: Share = Field(0.0, description="share of the rod radius; above 0 it is a variable")
+    built_misfit: Share = Field(
         0.0,
-        ge=0.0,
-        le=1.0,
         description="share of the mean misfit of structures as built with [tolerances], to first order; by the paper's "
         "method it goes to the others",
     )
@@ -344,10 +339,8 @@ class OptimiseEntry(Entry):
         description="distance of a node from its place under the design load, m, beyond which no cable is taken away for it, "
         "and polishing serves the farthest nodes beside all",
     )
-    allowance: float = Field(
+    allowance: Share = Field(
         0.08,
-        ge=0.0,
-        le=1.0,
         description="what all cables that are taken away may cost together, of the objective, which is 1 at the start: with 1 "
         "few cables count before the shape, as far as deviation lets them",
     )

@@ -31,6 +31,7 @@ Flexural = Annotated[PositiveFloat, AfterValidator(quantities.FLEXURAL.require)]
 PlaceDeviation = Annotated[NonNegativeFloat, AfterValidator(quantities.PLACE_DEVIATION.or_none)]
 
 _MOST = 1_000_000  # drawn structures and design evaluations: a day's work of a large machine, and years' of a small one
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Count = Annotated[PositiveInt, Field(le=_MOST)]
 CountOrNone = Annotated[NonNegativeInt, Field(le=_MOST)]
 
