@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from shellform.case.entries import Entry
-from shellform.case.sized import Density, EdgeSize, Strength, Young
+from shellform.case.sized import Density, EdgeSize, Share, Strength, Young
 
 
 class EdgeBeamEntry(Entry):
@@ -18,9 +18,7 @@ class EdgeBeamEntry(Entry):
     rods: PositiveInt | None = Field(
         None, description="in a bundle, each as the case's rods; left out with all else: 19"
     )
-    composite: float = Field(
-        0.5, ge=0.0, le=1.0, description="how far a bundle's rods act together, 1 as if glued, 0 loose"
-    )
+    composite: Share = Field(0.5, description="how far a bundle's rods act together, 1 as if glued, 0 loose")
     radius: EdgeSize | None = Field(None, description="of one round rod or tube, m")
     wall: EdgeSize | None = Field(None, description="of a tube, m")
     width: EdgeSize | None = Field(None, description="of a lath in the surface, m")

@@ -131,9 +131,7 @@ class _BoughtEntry(Entry):
     layers: Literal[1, 2] = Field(
         1, description="2: bent as two single laths one above the other, then locked by shear blocks"
     )
-    composite: float = Field(
-        0.5, ge=0.0, le=1.0, description="how far two layers act together, 1 as if glued, 0 loose"
-    )
+    composite: Share = Field(0.5, description="how far two layers act together, 1 as if glued, 0 loose")
 
 
 class OwnRodEntry(_BoughtEntry):
