@@ -302,7 +302,8 @@ def _leaving(search: Search, it: Iterate, model: StepModel) -> Indices:
     solver, shell, design = search.solver, search.problem.shell, it.point.design
     state = it.point.states[search.evaluator.problem.decisive_load()]
     pull = model.origin[: model.tensions]
-    some, patch, most = np.arange(len(pull)), None, min(it.batch, solver.largest)
+    some, most = np.arange(len(pull)), min(it.batch, solver.largest)
+    patch = some  # of few each is one for itself
     if len(pull) > solver.many:
         patch = patches(shell)[design.present]
         free = np.flatnonzero((pull > 0.0) & ~it.needed)
@@ -315,8 +316,5 @@ def _leaving(search: Search, it: Iterate, model: StepModel) -> Indices:
     if it.mind is not None:
         use += missed_without(search, it, model)[some]
     free = np.flatnonzero((share > 0.0) & ~it.needed[some])
-    if patch is None:
-        order = np.argsort(use[free], kind="stable")
-    else:
-        order = evenly(use[free], share[free], patch[some[free]])
+    order = evenly(use[free], share[free], patch[some[free]])
     return some[removable(kept, free[order], most, solver.kept)]

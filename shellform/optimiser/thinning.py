@@ -32,7 +32,7 @@ from shellform.structure.answers.sensitivity import element_columns
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
-from shellform.structure.solve.factorisation import columns_at_once
+from shellform.structure.solve.factorisation import column_blocks
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,7 @@ def kept_stiffness(
     unit = np.sqrt(stiffness)[:, None] * chord / length[:, None]
     pull = element_columns(assembly, cables.dofs(), np.hstack([-unit, unit]))[:, some]
     factor, kept = assembly.factor(state), np.eye(pull.shape[1])
-    step = columns_at_once(len(assembly.free))
-    for first in range(0, len(kept), step):
-        own = slice(first, min(first + step, len(kept)))
+    for own in column_blocks(len(kept), len(assembly.free)):
         kept[:, own] -= pull.T @ factor.solve(np.asfortranarray(pull[:, own].toarray()))
     return kept
 

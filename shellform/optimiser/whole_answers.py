@@ -18,7 +18,7 @@ from shellform.optimiser.step_setting import Quadratic, Setting
 from shellform.problem.terms import Squares
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
-from shellform.structure.solve.factorisation import columns_at_once
+from shellform.structure.solve.factorisation import column_blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,9 +122,7 @@ def _solved(
         rows = sp.csr_array(by_dof.tocsc()[:, assembly.free])
         moving = np.flatnonzero(np.diff(rows.indptr))
         moved_by.append((moving, rows[moving], np.empty((len(moving), right.shape[1]), order="F")))
-    step = columns_at_once(right.shape[0])
-    for first in range(0, right.shape[1], step):
-        own = slice(first, min(first + step, right.shape[1]))
+    for own in column_blocks(right.shape[1], right.shape[0]):
         solved = factor.solve(np.asfortranarray(right[:, own].toarray()))
         coupling[:, own] = pull.T @ solved
         for _, rows, result in moved_by:

@@ -386,3 +386,16 @@ def test_a_family_that_nobody_needs_is_let_go_of_at_once_with_its_factor(name, m
 def test_a_factor_serves_on_without_its_family():
     factor = Symmetric(np.array([0, 2, 3]), np.array([0, 1, 1])).factor(np.array([2.0, 1.0, 2.0]))
     np.testing.assert_allclose(factor.solve(np.array([3.0, 3.0])), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("count", "size", "blocks"),
+    [
+        (300, 50_000, [slice(0, 256), slice(256, 300)]),
+        (200, 131_072, [slice(0, 128), slice(128, 200)]),
+        (65, 10_000_000, [slice(0, 64), slice(64, 65)]),
+        (0, 50_000, []),
+    ],
+)
+def test_the_longer_right_hand_sides_are_the_fewer_are_solved_for_at_once(count, size, blocks):
+    assert list(factorisation.column_blocks(count, size)) == blocks

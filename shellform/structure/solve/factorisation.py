@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -54,9 +55,12 @@ def installed() -> list[str]:
     return [name for name, here in there.items() if here]
 
 
-def columns_at_once(size: int) -> int:
-    """How many right-hand sides of a `size` are solved for at once where there are thousands: some 130 MB."""
-    return max(min(_ROOM // max(size, 1), _MOST_COLUMNS), _FEWEST_COLUMNS)
+def column_blocks(count: int, size: int) -> Iterator[slice]:
+    """Of `count` right-hand sides of a `size` those that are solved for at once, where there are thousands:
+    some 130 MB."""
+    step = max(min(_ROOM // max(size, 1), _MOST_COLUMNS), _FEWEST_COLUMNS)
+    for first in range(0, count, step):
+        yield slice(first, min(first + step, count))
 
 
 def backend() -> str:
