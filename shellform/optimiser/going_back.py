@@ -1,5 +1,5 @@
-"""Back among the accepted designs of a search: to the last one that is sound, stands as built, or of which a
-fresh sample says so.
+"""Back among the accepted designs of a search: to the last one that keeps every limit, is sound, stands as
+built, or of which a fresh sample says so.
 """
 
 from __future__ import annotations
@@ -80,6 +80,17 @@ def last_standing(search: Search, it: Iterate) -> Iterate:
     if not found.accepted:  # none stands: the search goes on with what it has, and whoever judges says so
         return replace(it, fell=True, status=f"{it.status}; no design was found that stands as built")
     return replace(found, fell=False)
+
+
+def within_limits(search: Search, it: Iterate) -> Iterate:
+    """Back to the last accepted design that keeps every limit, where the last one breaks one. On its way a
+    descent may pass where what it gains outweighs that; where its evaluations end there, what it has is no
+    result. No further back than to where this turn began, or to what stood."""
+    kept = [number for number, each in enumerate(it.accepted, start=1) if each.violation <= 0.0]
+    if not kept or kept[-1] == len(it.accepted) or kept[-1] < max(it.begun, it.stood):
+        return it
+    back = last_sound(search, replace(it, accepted=it.accepted[: kept[-1]]))
+    return back if len(back.accepted) == kept[-1] else it
 
 
 def last_sound(search: Search, it: Iterate) -> Iterate:

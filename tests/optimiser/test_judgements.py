@@ -353,6 +353,31 @@ def test_a_search_goes_back_to_the_last_sound_design_and_to_none_where_none_is(r
     assert going_back.last_sound(None, returning(5)).accepted == ()
 
 
+@pytest.mark.parametrize(
+    ("broken", "changes", "end"),
+    [
+        ((0.0, 0.0, 0.2, 0.1), {}, 1),
+        ((0.0, 0.1, 0.0, 0.0), {}, 3),
+        ((0.0, 0.0, 0.2, 0.1), {"begun": 2}, 1),
+        ((0.0, 0.0, 0.2, 0.1), {"begun": 3}, 3),
+        ((0.0, 0.0, 0.2, 0.1), {"stood": 3}, 3),
+        ((0.3, 0.2, 0.2, 0.1), {}, 3),
+    ],
+)
+def test_a_descent_ends_with_its_last_design_that_keeps_every_limit_where_it_had_one(
+    returning, monkeypatch, broken, changes, end
+):
+    def search_at(sound):
+        sound_are(monkeypatch, sound)
+        it = returning(4)
+        own = tuple(replace(each, violation=most) for each, most in zip(it.accepted, broken, strict=True))
+        return going_back.within_limits(None, replace(it, accepted=own, **changes))
+
+    found = search_at({0, 1, 2, 3})
+    assert (found.point.design.number, len(found.accepted)) == (end, end + 1)
+    assert search_at({0, 2, 3}).point.design.number == 3, "one that its path doesn't lead to is no end"
+
+
 @pytest.mark.parametrize("stand", range(-1, 7))
 def test_a_search_goes_back_to_the_last_design_that_stands(returning, monkeypatch, stand):
     asked = []
