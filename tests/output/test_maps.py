@@ -8,6 +8,7 @@ import shellform as sf
 from shellform import render
 from shellform.errors import InputError
 from shellform.output.pictures import maps
+from shellform.output.pictures.panel import marked_nodes
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +34,21 @@ def test_each_map_shows_the_number_of_the_summary(shell, braced):
     supports = shell.net.supports
     np.testing.assert_allclose(panel["mode"].positions[supports], state.positions[supports])
     assert set(panel["deviation"].load_points) == set(np.flatnonzero(load[:, 2]))
+
+
+def test_no_load_is_marked_nearer_to_another_than_its_arrow_is_long():
+    across = np.linspace(0.0, 10.0, 101)
+    positions = np.stack([*np.meshgrid(across, across), np.zeros((101, 101))], axis=-1).reshape(-1, 3)
+    load = np.zeros((len(positions), 6))
+    load[:, 2] = -1.0
+    found = positions[marked_nodes(load, positions)]
+    far = np.linalg.norm(found[:, None] - found, axis=-1) + 10.0 * np.eye(len(found))
+    assert far.min() > 0.4
+    every = np.linalg.norm(positions[:, None, :2] - found[:, :2], axis=-1).min(axis=1)
+    assert every.max() <= 0.4 + 1e-12, "and none is far from one that is marked"
+    load[5000, 2] = -100.0
+    assert marked_nodes(load, positions).tolist() == [5000], "small ones beside it are not marked"
+    assert len(marked_nodes(np.zeros_like(load), positions)) == 0
 
 
 def test_the_curvature_without_load_and_cables_is_about_the_net_s(shell):

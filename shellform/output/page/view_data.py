@@ -108,7 +108,7 @@ def view_data(viewed: ViewedShell) -> dict[str, Any]:
             {
                 "name": name,
                 "title": viewed.load_titles[name],
-                "points": marked_nodes(load).tolist(),
+                "points": marked_nodes(load, place).tolist(),
             }
             for name, load in viewed.loads.items()
         ],

@@ -76,7 +76,9 @@ def panel_of(
         cables=cables.ends,
         cable_forces=cables.tension(state),
         supports=shell.net.supports,
-        load_points=np.empty(0, dtype=np.int64) if load is None else marked_nodes(load),
+        load_points=np.empty(0, dtype=np.int64)
+        if load is None
+        else marked_nodes(load, shell.target.positions),
         rod_radius=chosen.radius,
         quantity=seen.quantity,
         unit=seen.unit,

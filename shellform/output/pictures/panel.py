@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.errors import InputError, require_known, require_number
@@ -26,13 +27,24 @@ FORMATS = (".png", ".svg", ".pdf")
 # of the largest load on a node: smaller ones, such as of the rods' own weight, would hide the shell behind
 # arrows
 _MARKED = 0.2
+_ARROW = 0.04  # its length over the largest extent
 _THIN = 0.0024  # half the width at which a rod is drawn at least, over the width of the picture
 
 
-def marked_nodes(load: Reals) -> Indices:
-    """The nodes at which a `load` (n, 6), N, is marked."""
+def marked_nodes(load: Reals, positions: Reals) -> Indices:
+    """The nodes at which a `load` (n, 6), N, is marked, at `positions` (n, 3), m: none is nearer to another
+    than an arrow is long, or the arrows of thousands of crossings hide the shell."""
     weight = np.linalg.norm(load[:, :3], axis=1)
-    return np.flatnonzero(weight > _MARKED * weight.max(initial=0.0))
+    found = np.flatnonzero(weight > _MARKED * weight.max(initial=0.0))
+    if not len(found):
+        return found
+    near = cKDTree(positions[found]).query_ball_point(positions[found], _ARROW * _reach(positions))
+    free = np.ones(len(found), dtype=bool)
+    for each, beside in enumerate(near):
+        if free[each]:
+            free[beside] = False
+            free[each] = True
+    return found[free]
 
 
 def scale_end(largest: float) -> float:
@@ -193,7 +205,7 @@ class Scale:
 
 def scale_of(panels: Sequence[Panel], look: Look, size: tuple[int, int]) -> Scale:
     """The scale of panels that are drawn `size` pixels large each."""
-    reach = max(max(float(np.ptp(panel.positions, axis=0).max()) for panel in panels), 1e-9)
+    reach = max(_reach(panel.positions) for panel in panels)
     force = look.force or max(float(panel.cable_forces.max(initial=0.0)) for panel in panels)
     slack = any((panel.cable_forces <= 0.0).any() for panel in panels)
     usual = max(11, round(0.034 * min(size[1], 0.7 * size[0])))
@@ -223,7 +235,7 @@ def cable_thickness(share: Reals) -> Reals:
 
 def arrow_length(scale: Scale) -> float:
     """m, of the arrows that mark loads."""
-    return 0.04 * scale.reach
+    return _ARROW * scale.reach
 
 
 def long_enough(positions: Reals, pairs: Indices) -> Indices:
@@ -231,4 +243,9 @@ def long_enough(positions: Reals, pairs: Indices) -> Indices:
     without.
     """
     length = np.linalg.norm(positions[pairs[:, 1]] - positions[pairs[:, 0]], axis=1)
-    return np.flatnonzero(length > 1e-9 * max(float(np.ptp(positions, axis=0).max()), 1e-9))
+    return np.flatnonzero(length > 1e-9 * _reach(positions))
+
+
+def _reach(positions: Reals) -> float:
+    """m, the largest extent."""
+    return max(float(np.ptp(positions, axis=0).max()), 1e-9)
