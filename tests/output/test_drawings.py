@@ -4,6 +4,7 @@ top of each other.
 
 from dataclasses import replace
 from itertools import combinations, pairwise
+from types import SimpleNamespace
 
 import ezdxf
 import numpy as np
@@ -125,6 +126,18 @@ def test_the_rod_sheets_have_every_mark_and_splice(folder, built):
         assert f"L = {1e3 * rod.length:.1f}" in text
         assert all(f"{1e3 * mark:.1f}" in text for mark in rod.marks)
     assert text.count("splice ") == sum(rod.length > 0.6 for rod in built.grid.rods)
+
+
+def test_long_rods_close_together_share_a_sheet_as_far_as_it_has_room():
+    def grid(count, length, spacing):
+        return SimpleNamespace(
+            rods=[SimpleNamespace(length=length)] * count, spacing=spacing, spacing_v=spacing
+        )
+
+    assert drawings.rods_a_sheet(grid(26, 1.0, 0.055)) == 26
+    assert drawings.rods_a_sheet(grid(44, 1.0, 0.055)) == 22, "as many on each of both"
+    assert drawings.rods_a_sheet(grid(236, 58.8, 0.5)) == 79
+    assert drawings.rods_a_sheet(grid(100, 58.8, 0.5)) == 100
 
 
 def test_the_same_design_gives_the_same_files(folder, built, tmp_path):

@@ -167,7 +167,7 @@ def test_splicing_is_said_in_the_list_and_neighbours_are_divided_from_opposite_e
     (told, warned) = schedules.cutting_notes(cutting, schedules.rod_names(grid))
     assert "bars of 5 m" in told
     assert "3 rods are longer than the stock and must be SPLICED" in warned
-    assert "U0, U1, U2" in warned
+    assert "U0 to U2" in warned
 
 
 @pytest.mark.parametrize(

@@ -101,6 +101,11 @@ def test_the_buyer_is_told_of_bars_saw_cuts_and_waste_and_whether_fewer_could_do
     (said, warned) = cutting_notes(CUTTING, ["A", "B"])
     assert said == "3 bars of 6 m, saw cuts of 3 mm, 33 % waste; fewer can't do."
     assert warned.endswith("strong as the rod: A, B.")
+    many = Cutting(
+        6.0, 0.0, tuple(Bar((Piece(k, 2, 2, 3.0, 5.0),), 1.0) for k in (0, 1, 3, 4, 5, 6, 7, 9)), 8
+    )
+    names = [*(f"U{k}" for k in range(5)), *(f"V{k}" for k in range(5, 10))]
+    assert cutting_notes(many, names)[1].endswith("strong as the rod: U0, U1, U3, U4, V5 to V7, V9.")
     whole = Cutting(6.0, 0.0025, (Bar((Piece(0, 1, 1, 0.0, 4.5),), 1.5),) * 3, 2)
     assert cutting_notes(whole, ["A"]) == (
         "3 bars of 6 m, saw cuts of 2.5 mm, 25 % waste; fewer than 2 can't do.",

@@ -120,8 +120,9 @@ def write_3dm(path: str | Path, built: Built, target: Surface, *, load: str = "d
         strings = {f"on the support under {name} [N]": _row(push[node]) for name, push in pushes.items()}
         items.append(Item("supports", f"S{k}", state.positions[[node]], strings=strings))
     places = {name: crossing_points(built.grid, each) for name, each in built.states.items()}
+    wanted = shell.net.crossings
     for k, point in enumerate(places[load]):
-        strings = {"target [m]": _row(shell.net.crossings[k])}
+        strings = {"target [m]": _row(wanted[k])}
         strings |= {f"under {name} [m]": _row(each[k]) for name, each in places.items()}
         items.append(Item("crossings", str(k), point[None], strings=strings))
     about = {"job": built.title, "design": built.name, "load": load, "date": built.block.date}

@@ -21,6 +21,7 @@ from ezdxf.enums import TextEntityAlignment
 from ezdxf.layouts import Modelspace
 
 import shellform
+from shellform.net.grid import Grid
 from shellform.output.pictures.letters import columns, without_font
 from shellform.output.pictures.plots import Label, PaperLine, PaperPage, write_pages
 from shellform.output.workshop import layout, setting_out
@@ -33,7 +34,8 @@ from shellform.written import whole
 SCALES = (1.0, 2.0, 2.5, 5.0, 10.0, 15.0, 20.0, 25.0, 50.0, 75.0, 100.0, 200.0, 500.0, 1000.0)
 PAPERS = {"A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 SMALLEST = 1.6  # mm, of letters on paper
-STRIPS = 26  # rods on a sheet
+STRIPS = 26  # rods on a sheet, or as many as have room where the longest fills its width
+_HIGH = 0.75  # over its width: what a sheet has room for
 _EDGE, _BOUND = 10.0, 20.0  # mm, of the frame from the paper's edge, and on the side where it is bound
 _COLUMN = 110.0  # mm, of the column with title block, notes and list
 _BLOCK = 72.0  # mm, height of the title block
@@ -59,12 +61,19 @@ def write_drawings(folder: str | Path, built: Built, cutting: Cutting) -> list[P
         write_dxf(files[-2], sheet, built)
         pages = [sheet]
         if name == "rods":
+            most = rods_a_sheet(built.grid)
             pages = [
-                layout.rod_strips(built, cutting, k, k + STRIPS)
-                for k in range(0, len(built.grid.rods), STRIPS)
+                layout.rod_strips(built, cutting, k, k + most) for k in range(0, len(built.grid.rods), most)
             ]
         write_pdf(files[-1], pages, built)
     return files
+
+
+def rods_a_sheet(grid: Grid) -> int:
+    """How many rods lie on each sheet of their own, one under the other."""
+    high = layout.STRIP * min(grid.spacing, grid.spacing_v)
+    most = max(STRIPS, int(_HIGH * max(rod.length for rod in grid.rods) / high))
+    return -(-len(grid.rods) // -(-len(grid.rods) // most))
 
 
 def letters_note(built: Built) -> tuple[str, ...]:

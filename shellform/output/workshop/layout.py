@@ -38,6 +38,8 @@ from shellform.output.workshop.marks import (
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.schedules import Built, cable_crossings, rounds
 
+STRIP = 0.75  # from one rod to the next on their own sheet, over the spacing
+
 
 def flat_grid(built: Built) -> Sheet:
     """The grid as it is laid out flat and straight: rods, crossings, their numbers, cut lengths, first marks,
@@ -117,7 +119,8 @@ def _ends(built: Built, s: float, marks: Sequence[Mark]) -> list[Mark]:
     beyond the rod.
     """
     supports = {int(node): number for number, node in enumerate(built.shell.net.supports)}
-    taken = [box_of(mark) for mark in marks if isinstance(mark, Words) or mark.layer == "SUPPORTS"]
+    boxes = [box_of(mark) for mark in marks if isinstance(mark, Words) or mark.layer == "SUPPORTS"]
+    taken = np.array(boxes).reshape(-1, 4)
     found: list[Mark] = []
     height, gap = 0.085 * s, 0.03 * s
     sides = [(1.0, "bottom"), (-1.0, "top")]
@@ -147,7 +150,7 @@ def _ends(built: Built, s: float, marks: Sequence[Mark]) -> list[Mark]:
                     for turn, foot in (sides if layer == "SUPPORT_NUMBERS" else sides[::-1])
                 ]
                 chosen = next((words for words in choices if free(words, taken)), choices[0])
-                taken.append(chosen.box)
+                taken = np.vstack([taken, chosen.box])
                 found.append(chosen)
     return found
 
@@ -271,7 +274,7 @@ def rod_strips(built: Built, cutting: Cutting, first: int = 0, last: int | None 
     marks: list[Mark] = []
     height = 0.11 * s
     for row, number in enumerate(range(first, len(grid.rods) if last is None else min(last, len(grid.rods)))):
-        rod, y = grid.rods[number], -0.75 * s * row
+        rod, y = grid.rods[number], -STRIP * s * row
         layer = f"RODS_{rod.direction.upper()}"
         length = MM * rod.length
         marks.append(Stroke(layer, ((0.0, y), (length, y))))

@@ -153,10 +153,12 @@ def overlap(a: Box, b: Box, gap: float = 0.0) -> bool:
     return a[0] < b[2] + gap and b[0] < a[2] + gap and a[1] < b[3] + gap and b[1] < a[3] + gap
 
 
-def free(words: Words, taken: Sequence[Box]) -> bool:
-    """Whether the words lie on none of what is there already, nor too near."""
+def free(words: Words, taken: Reals | Sequence[Box]) -> bool:
+    """Whether the words lie on none of the boxes (k, 4) that are there already, nor too near."""
     gap = APART * words.height
-    return not any(overlap(words.box, other, gap) for other in taken)
+    x0, y0, x1, y1 = words.box
+    left, low, right, high = np.asarray(taken, dtype=float).reshape(-1, 4).T
+    return not bool(np.any((x0 < right + gap) & (left < x1 + gap) & (y0 < high + gap) & (low < y1 + gap)))
 
 
 def square(place: Reals, half: float) -> Stroke:

@@ -24,18 +24,33 @@ def cutting_notes(cutting: Cutting, names: list[str]) -> tuple[str, ...]:
         f"{100 * cutting.waste:.0f} % waste; {fewer} can't do."
     ]
     if cutting.spliced:
-        which = ", ".join(names[rod] for rod in cutting.spliced)
+        which = _listed(names, cutting.spliced)
         said.append(
             f"{how_many(len(cutting.spliced), 'rod is', 'rods are')} longer than the stock and must be SPLICED; the analysis takes "
             "a splice for as stiff and as "
             f"strong as the rod: {which}."
         )
     if cutting.spliced_through:
-        which = ", ".join(names[rod] for rod in cutting.spliced_through)
+        which = _listed(names, cutting.spliced_through)
         said.append(
             f"Both laths are spliced in one place, where only splices hold the rod: {which}. Longer stock leaves room to part them."
         )
     return tuple(said)
+
+
+def _listed(names: Sequence[str], rods: Sequence[int]) -> str:
+    """The names of rods, their numbers in order; of three or more neighbours that have one direction's letter
+    the first and the last."""
+    runs: list[list[int]] = []
+    for rod in rods:
+        if runs and rod == runs[-1][-1] + 1 and names[rod][0] == names[runs[-1][-1]][0]:
+            runs[-1].append(rod)
+        else:
+            runs.append([rod])
+    return ", ".join(
+        f"{names[run[0]]} to {names[run[-1]]}" if len(run) > 2 else ", ".join(names[rod] for rod in run)
+        for run in runs
+    )
 
 
 def lath_names(cutting: Cutting) -> dict[int, str]:
@@ -54,8 +69,10 @@ def splice_table(
     grid, beams = shell.net.grid, shell.beams(design.radius)
     section = shell.rod.resized(design.radius).section
     first = np.concatenate([[0], np.cumsum([len(rod.nodes) - 1 for rod in grid.rods])])  # element of each rod
+    rod_elements, locks = beams.of_kind(ROD), beams.of_kind(LOCK)
     forces = {name: beams.local_forces(state) for name, state in states.items()}
-    locked = beams.of_kind(LOCK)
+    of_rods = {name: own[rod_elements] for name, own in forces.items()}
+    of_locks = {name: own[locks] for name, own in forces.items()}
     places = sorted(
         {(piece.rod, piece.start) for bar in cutting.bars for piece in bar.pieces if piece.part > 1}
     )
@@ -71,15 +88,15 @@ def splice_table(
             int(rod.crossings[before]),
             int(rod.crossings[before + 1]),
         ]
-        for own in forces.values():
-            axial, _, y_a, z_a, _, y_b, z_b = own[beams.of_kind(ROD)][first[number] + inside]
+        for name, own in of_rods.items():
+            axial, _, y_a, z_a, _, y_b, z_b = own[first[number] + inside]
             # Both ends' moments are counted as they turn the ends, so that a constant bending moment has
             # opposite signs there.
             bent = (1.0 - share) * np.array([y_a, z_a]) - share * np.array([y_b, z_b])
             if isinstance(section, TwoLayers):
                 axial, bent = 0.5 * axial, 0.5 * bent
-                if locked.any():
-                    couple = own[locked][first[number] + inside]
+                if locks.any():
+                    couple = of_locks[name][first[number] + inside]
                     axial += abs((1.0 - share) * couple[2] - share * couple[5]) / section.apart
             row += [float(axial), float(np.linalg.norm(bent))]
         rows.append(tuple(row))
