@@ -19,6 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 from matplotlib.tri import Triangulation
 from numpy.typing import ArrayLike, NDArray
@@ -200,13 +201,19 @@ def _page(page: PaperPage) -> Figure:
             )
         )
     vertical = {"bottom": "baseline", "middle": "center_baseline", "top": "top"}
+    fonts: dict[tuple[float, bool, tuple[str, ...]], FontProperties] = {}
     for label in page.labels:
-        axes.text(
-            *label.place, label.text, fontsize=label.height / _CAPITAL / _INCH * _POINTS, color=label.colour,
-            rotation=label.angle,
+        kind = label.height, label.bold, tuple(families(label.text))
+        if kind not in fonts:
+            fonts[kind] = FontProperties(
+                family=list(kind[2]),
+                size=label.height / _CAPITAL / _INCH * _POINTS,
+                weight="bold" if label.bold else "normal",
+            )
+        figure.text(
+            *label.place, label.text, color=label.colour, fontproperties=fonts[kind],
+            rotation=label.angle, rotation_mode="anchor", transform=axes.transData,
             ha="center" if label.side == "middle" else label.side, va=vertical[label.foot],
-            rotation_mode="anchor", fontfamily=families(label.text),
-            fontweight="bold" if label.bold else "normal",
         )  # fmt: skip
     return figure
 
