@@ -84,6 +84,7 @@ _SPACINGS = 3  # tried, one after the other
 _STEPS = 4  # sections tried on one net
 # where less stiff ones fell, deeper ones broke, and some lie between; two layers of thinner ones come before
 _NARROWED = 6
+_THINNING = 0.3  # of a search's work, at the least: thinner concrete comes before ways out
 _TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyond it no others are tried
 Say = Callable[[str], None]
 
@@ -138,8 +139,7 @@ class _Search:
         self.failures: list[Obstacle] = []
         self.reasons: dict[float, str] = {}
         self.edges = Edges(outer=wish.edges)
-        one = (1,) if wish.rod else (1, 2)
-        self.layers: Sequence[int] = one if wish.layers is None else (wish.layers,)
+        self.layers: Sequence[int] = (wish.layers,) if wish.layers else (1,) if wish.rod else (1, 2)
         self.lightest = 0  # of the choices of edge beams, with which they begin
         self.angles: Sequence[float] = ANGLES  # worth trying; with a finer spacing only those that were best
 
@@ -208,8 +208,7 @@ class _Search:
             return None
         for layers, placed in itertools.product(self.layers, nets):
             possible = choices(placed.net, spacing, self.wish.rod, layers)
-            result = self._first_that_stands(placed, possible, spacing, thickness) if possible else None
-            if result is not None:
+            if possible and (result := self._first_that_stands(placed, possible, spacing, thickness)):
                 return result
         if self.best is None:
             self._keep(too_curved(nets[-1], wished(self.wish.rod, self.layers[0]), spacing, thickness))
@@ -276,6 +275,7 @@ class _Search:
             raise refused(self.surface, failure, self.wish)
         if not self.allowance.thins:
             raise refused(self.surface, self.best, self.wish)
+        self.allowance.leave(_THINNING)
         layers, least = layers_of(failure.choice.section), min(LEAST_THICKNESS, 0.5 * thickness)
         possible = choices(failure.placed.net, failure.spacing, self.wish.rod, layers)
         nearest, result = thinned(

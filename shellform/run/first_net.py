@@ -75,6 +75,10 @@ class Allowance:
         """Another one, that may spend a `share` of this one's work."""
         return Allowance(round(share * self.work), thorough, thins, whole=self)
 
+    def leave(self, share: float) -> None:
+        """Sees to it that a `share` of its work is left, at the cost of what else the whole is for."""
+        self.left = max(self.left, round(share * self.work))
+
     def spend(self, crossings: float, times: int = 1) -> None:
         """Takes what a pull or a trial on a net of so many `crossings` costs."""
         self.left -= times * round(crossings)

@@ -94,6 +94,17 @@ def test_the_best_net_is_tried_half_a_spacing_off_too(pulled, curvature, cost, m
     assert still.offset == (0.0, 0.0), "the other stalls"
 
 
+def test_a_part_leaves_a_share_of_its_work_to_what_comes_last_for_which_the_whole_pays():
+    whole = Allowance(9000)
+    part = whole.part(2 / 3)
+    part.spend(6500)
+    assert part.over
+    part.leave(0.3)
+    assert (part.left, whole.left, part.over) == (1800, 2500, False)
+    part.leave(0.1)
+    assert part.left == 1800, "more is left"
+
+
 def test_a_pull_that_stalls_costs_four_that_end_and_none_is_begun_once_the_work_is_done(pulled):
     allowance = Allowance(1700)
     placed, _, asked, (said, _) = pulled(allowance, (45.0, 0.0, 23.0), a0=net(1.0), a23=net(0.5))
