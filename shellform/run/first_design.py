@@ -1,12 +1,13 @@
 """The design that `shellform new` proposes: a net, rods, cables and a load under which it stands.
 
-Nets are pulled at several angles, and the one that bends its rods least is taken. Then the initial design is
-solved under its growing load, for the rods with which the estimate says to begin (sizes.py), stiffer ones
-where it falls, two layers where the stiffest that equation (1) allows falls, finer spacings, and thinner
-concrete last. What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods,
-solved again, and forty structures are drawn and loaded (first_trial.py). Edge beams are bundles of rods, or
-stiffer steel tubes where these are stressed too much or the shell nearly stands (first_edges.py). What stands
-gets heavier edge beams, stiffer rods and thicker strands where they help (first_finish, first_steadier).
+Nets are pulled at several angles, and the one that bends its rods least is taken. Then the initial design
+is solved under its growing load, for the rods with which the estimate says to begin (sizes.py), stiffer
+ones where it falls, two layers where the stiffest that equation (1) allows falls, finer spacings, and
+thinner concrete last (first_thinner.py). What stands up to `NEEDED` times its load is pulled anew with the
+gap that follows its rods, solved again, and forty structures are drawn and loaded (first_trial.py). Edge
+beams are bundles of rods, or stiffer steel tubes where these are stressed too much or the shell nearly
+stands (first_edges.py). What stands gets heavier edge beams, stiffer rods and thicker strands where they
+help (first_finish, first_steadier).
 
 Nothing is random but what is drawn under a fixed seed: the same surface gives the same case.
 """
@@ -28,6 +29,7 @@ from shellform.run.first_edges import HEAVY, EdgeChoice, edge_choices
 from shellform.run.first_finish import came_to, nearer, straighter, too_far, with_room
 from shellform.run.first_net import ANGLES, Allowance, least_bent_net, net_told, with_gap
 from shellform.run.first_steadier import steadier, strays, with_strays
+from shellform.run.first_thinner import with_thinner_concrete
 from shellform.run.first_trial import (
     DRAWN,
     NEEDED,
@@ -40,7 +42,6 @@ from shellform.run.first_trial import (
 from shellform.run.next_trial import (
     EASES,
     after,
-    bears_most,
     edges_may_help,
     fails_by,
     finer_is_vain,
@@ -48,7 +49,6 @@ from shellform.run.next_trial import (
     narrowed,
     relieved,
     stiffer_rods,
-    thinned,
 )
 from shellform.run.sizes import (
     MOST_CROSSINGS,
@@ -78,13 +78,11 @@ from shellform.run.unbuildable import (
 )
 from shellform.surface.shape.target import Surface
 
-LEAST_THICKNESS = 0.015  # m: a first layer of sprayed concrete
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3  # tried, one after the other
 _STEPS = 4  # sections tried on one net
 # where less stiff ones fell, deeper ones broke, and some lie between; two layers of thinner ones come before
 _NARROWED = 6
-_THINNING = 0.3  # of a search's work, at the least: thinner concrete comes before ways out
 _TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyond it no others are tried
 Say = Callable[[str], None]
 
@@ -170,7 +168,10 @@ class _Search:
             design = self._on_net(spacing, thickness)
             if design is not None:
                 return design
-        return self._thinner(thickness)
+        assert self.best is not None
+        return with_thinner_concrete(
+            self.surface, self.wish, self.failures, self.best, self._stands, self.allowance
+        )
 
     def _first_spacing(self) -> float:
         if self.wish.spacing is not None:
@@ -265,28 +266,6 @@ class _Search:
             tried[at] = result
             at = after(placed.net, possible, tried, last=narrows)
         return None
-
-    def _thinner(self, thickness: float) -> FirstDesign:
-        """The thickest concrete that stands where the design falls. Raises where less than a layer is left,
-        or another was asked for."""
-        assert self.best is not None
-        failure = bears_most(self.failures, self.best)
-        if failure.choice is None or failure.placed is None or failure.why in (Why.CURVATURE, Why.SPACING):
-            raise refused(self.surface, failure, self.wish)
-        if not self.allowance.thins:
-            raise refused(self.surface, self.best, self.wish)
-        self.allowance.leave(_THINNING)
-        layers, least = layers_of(failure.choice.section), min(LEAST_THICKNESS, 0.5 * thickness)
-        possible = choices(failure.placed.net, failure.spacing, self.wish.rod, layers)
-        nearest, result = thinned(
-            failure, self.best, possible, least, self._stands, lambda: self.allowance.over
-        )
-        if result is None:
-            raise refused(self.surface, nearest, self.wish)
-        if self.wish.thickness is not None or result.thickness < least:
-            nearest = replace(nearest, thickness=thickness)
-            raise refused(self.surface, nearest, self.wish, bears=result.thickness)
-        return result
 
     def _nets(self, spacing: float, gap: float) -> list[Placed]:
         """The net that bends its rods least, among several angles and offsets; before it, on a saddle, the

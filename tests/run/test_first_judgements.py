@@ -525,23 +525,3 @@ def test_sections_are_narrowed_down_only_where_no_more_layers_come(monkeypatch, 
     monkeypatch.setattr(first_design, "narrowed", lambda *_: narrowed)
     assert search._first_that_stands(SimpleNamespace(net=None), row, 0.5, 0.05) is None
     assert tried == row[:trials]
-
-
-def test_thinner_concrete_is_tried_where_sections_have_taken_all_the_work(monkeypatch):
-    allowed = []
-
-    def thinned(failure, nearest, possible, least, stands, over):
-        allowed.append((search.allowance.left, over()))
-        return nearest, SimpleNamespace(thickness=0.03)
-
-    monkeypatch.setattr(first_design, "thinned", thinned)
-    monkeypatch.setattr(first_design, "choices", lambda *_: [])
-    search = _Search("roof", DesignWish(), print, Allowance(9000).part(2 / 3))
-    search.allowance.spend(7000)
-    choice = Choice(sf.Rod.round(young=40e9, radius=0.01).section)
-    search.best = Obstacle(Why.STABILITY, 1.5, 0.05, 0.9, choice, SimpleNamespace(net=None))
-    assert search._thinner(0.05).thickness == 0.03
-    assert allowed == [(1800, False)], "three tenths of 6000, while 2000 of the whole are left"
-    search.allowance.spend(2000)
-    search._thinner(0.05)
-    assert allowed[1:] == [(1800, True)], "the whole is spent"
