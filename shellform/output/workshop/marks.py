@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -148,17 +149,15 @@ def box_of(mark: Mark) -> Box:
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
-def overlap(a: Box, b: Box, gap: float = 0.0) -> bool:
-    """Whether two boxes lie on each other, or nearer than `gap`."""
-    return a[0] < b[2] + gap and b[0] < a[2] + gap and a[1] < b[3] + gap and b[1] < a[3] + gap
+def overlap(a: Box, b: Box | Reals, gap: float = 0.0) -> Any:
+    """Whether two boxes lie on each other, or nearer than `gap`; where `b` are boxes (4, k), of each (k,)."""
+    return (a[0] < b[2] + gap) & (b[0] < a[2] + gap) & (a[1] < b[3] + gap) & (b[1] < a[3] + gap)
 
 
 def free(words: Words, taken: Reals | Sequence[Box]) -> bool:
     """Whether the words lie on none of the boxes (k, 4) that are there already, nor too near."""
-    gap = APART * words.height
-    x0, y0, x1, y1 = words.box
-    left, low, right, high = np.asarray(taken, dtype=float).reshape(-1, 4).T
-    return not bool(np.any((x0 < right + gap) & (left < x1 + gap) & (y0 < high + gap) & (low < y1 + gap)))
+    boxes = np.asarray(taken, dtype=float).reshape(-1, 4).T
+    return not np.any(overlap(words.box, boxes, APART * words.height))
 
 
 def square(place: Reals, half: float) -> Stroke:
