@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from shellform.optimiser.descent import descend
-from shellform.optimiser.going_back import last_sound, within_limits
+from shellform.optimiser.going_back import last_sound
 from shellform.optimiser.minding import WORTH_A_TURN, begin_turn, finely, lead_by
 from shellform.optimiser.optimum import worse
 from shellform.optimiser.search_state import Iterate, Search, accepted_design, taut_count
@@ -58,7 +58,7 @@ def agreed(search: Search, it: Iterate) -> tuple[bool, Iterate]:
         refused = False
         if it.until:  # in the middle of a turn
             spent = search.evaluator.evaluations
-            it = within_limits(search, descend(finely(search, it.until), it))
+            it = descend(finely(search, it.until), it)
             refused = len(it.accepted) == it.begun  # by the sample that led the turn, which found no step
             if refused and (
                 it.begun == it.stood or it.samples >= _MOST or search.evaluator.evaluations == spent

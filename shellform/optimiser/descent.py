@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from shellform.optimiser.going_back import within_limits
 from shellform.optimiser.optimum import worse
 from shellform.optimiser.proposal import propose
 from shellform.optimiser.resuming import tell
@@ -59,7 +60,11 @@ def climb(search: Search, it: Iterate) -> Iterate:
 def descend(search: Search, it: Iterate, *, least: int = 0) -> Iterate:
     """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none
     may; and so on as long as both together improve the objective. A design that keeps every limit leaves the
-    `least` of the evaluations to what comes next."""
+    `least` of the evaluations to what comes next, and is where it ends, where there is one."""
+    return within_limits(search, _rounds(search, it, least))
+
+
+def _rounds(search: Search, it: Iterate, least: int) -> Iterate:
     solver = search.solver
     while search.left() > (least if it.stage == 1.0 and violation(search, it.point) <= 0.0 else 0):
         tell(search, it)

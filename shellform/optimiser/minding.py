@@ -19,7 +19,7 @@ from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.descent import descend
-from shellform.optimiser.going_back import last_sound, within_limits
+from shellform.optimiser.going_back import last_sound
 from shellform.optimiser.optimum import worse
 from shellform.optimiser.search_state import (
     Iterate,
@@ -67,7 +67,7 @@ def lead(search: Search, it: Iterate) -> Iterate:
     at the last one that does, or where none does at the one that stood before."""
     last = int(_LED * search.evaluations)
     while search.left() > 0:
-        it = within_limits(search, descend(finely(search, it.until), it))
+        it = descend(finely(search, it.until), it)
         found = sound(search, it.accepted[-1])
         if found is None:
             break

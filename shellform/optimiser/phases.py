@@ -15,7 +15,7 @@ from shellform.arrays import Flags, Indices
 from shellform.gridshell.grouping import patches
 from shellform.optimiser.agreeing import agreed, leaving_some, pausing
 from shellform.optimiser.descent import climb, descend
-from shellform.optimiser.going_back import last_confirmed, last_sound, last_standing, within_limits
+from shellform.optimiser.going_back import last_confirmed, last_sound, last_standing
 from shellform.optimiser.minding import (
     add_fallen,
     lead,
@@ -62,8 +62,7 @@ def run(search: Search, it: Iterate) -> Iterate:
         it = replace(climb(search, it), phase="descend")
     if it.phase == "descend":
         thins = search.solver.thin and search.evaluator.blocks.each_cable is not None
-        it = descend(search, it, least=search.evaluations // 2 if thins else 0)
-        it = last_sound(search, within_limits(search, it))
+        it = last_sound(search, descend(search, it, least=search.evaluations // 2 if thins else 0))
         if thins:
             it = _stiffened(search, it) if it.accepted else last_standing(search, it)
         elif it.mind is not None:  # judged by what it was led by, trials would say nothing new

@@ -11,6 +11,14 @@ from shellform.optimiser import descent
 from tests.optimiser.test_phases import iterate, point, searching
 
 
+@pytest.fixture(autouse=True)
+def kept(monkeypatch):
+    """Designs whose limits aren't looked at when a descent ends; what it ends with is kept."""
+    ends = []
+    monkeypatch.setattr(descent, "within_limits", lambda search, it: ends.append(it) or it)
+    return ends
+
+
 def test_a_climb_ends_with_its_window_or_its_evaluations(monkeypatch):
     """Refused each time, it shrinks from 0.2 N by 0.4 to 0.128 of 4 N times 0.01."""
     search = searching(
@@ -115,6 +123,14 @@ def descending(monkeypatch):
     monkeypatch.setattr(descent, "propose", lambda *_: (None, told.predicted))
     monkeypatch.setattr(descent, "attempt", attempt)
     return told
+
+
+def test_a_descent_ends_where_its_last_design_that_keeps_every_limit_is(descending, monkeypatch, kept):
+    descending.trial = point(1.5)
+    assert descent.descend(searching(1), iterate(point(2.0))) is kept[0]
+    assert kept[0].point is descending.trial
+    monkeypatch.setattr(descent, "within_limits", lambda search, it: replace(it, point="before"))
+    assert descent.descend(searching(1), iterate(point(2.0))).point == "before"
 
 
 @pytest.mark.parametrize(

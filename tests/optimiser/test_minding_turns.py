@@ -182,12 +182,14 @@ def test_a_search_is_led_from_the_design_that_stands_by_what_falls_in_the_other_
 @pytest.fixture
 def turns(search, monkeypatch):
     """Turns of ten evaluations, each of which ends at a design of a told objective that stands or doesn't."""
-    told = SimpleNamespace(ends=[], log=[], judged=[], within=lambda it: it)
+    told = SimpleNamespace(ends=[], log=[], judged=[])
 
     def descend(fine, it):
         assert fine.solver.window == 0.05
         search.evaluator.evaluations += 10
         objective, told.stands, told.sound = told.ends.pop(0)
+        if objective is None:
+            return replace(it, until=0)
         return replace(
             iterate(objective),
             accepted=(*it.accepted, accepted_one(objective)),
@@ -209,7 +211,6 @@ def turns(search, monkeypatch):
     )
     monkeypatch.setattr(minding, "remembering", lambda search, it: told.log.append("remembering") or it)
     monkeypatch.setattr(minding, "last_sound", lambda search, it: it)
-    monkeypatch.setattr(minding, "within_limits", lambda search, it: told.within(it))
     monkeypatch.setattr(
         minding, "restiffened", lambda search, it, least: told.log.append(("as before", least, it.mind)) or it
     )
@@ -228,12 +229,12 @@ def test_turns_follow_as_long_as_each_gains_three_hundredths_and_its_design_stan
     assert len(turns.ends) == 1
 
 
-def test_a_turn_that_ends_with_a_limit_broken_is_judged_by_the_design_before_it(turns):
-    turns.ends = [(0.9, True, True), (0.5, True, True)]
-    turns.within = lambda it: it if len(it.accepted) == 2 else replace(it, accepted=it.accepted[:-1])
+def test_a_turn_without_a_step_is_judged_by_the_design_before_it_and_is_the_last(turns):
+    turns.ends = [(0.9, True, True), (None, True, True), (0.5, True, True)]
     found = turns.led()
     assert turns.judged == ["built 0.9", "built 0.9"]
     assert [each.objective for each in found.accepted] == [1.0, 0.9]
+    assert len(turns.ends) == 1
 
 
 def test_a_turn_that_leads_to_a_worse_design_is_the_last_and_the_better_one_is_taken(turns):

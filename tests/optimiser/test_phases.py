@@ -53,9 +53,8 @@ def ways(monkeypatch):
 
         return phase
 
-    for name in ("climb", "descend", "within_limits", "last_sound", "_stiffened", "last_standing"):
+    for name in ("climb", "descend", "last_sound", "_stiffened", "last_standing", "last_confirmed"):
         monkeypatch.setattr(phases, name, way(name.strip("_")))
-    monkeypatch.setattr(phases, "last_confirmed", way("last_confirmed"))
     monkeypatch.setattr(phases, "_led", lambda search, it: way(f"led by {search}")(search, it))
     monkeypatch.setattr(phases, "_thin", lambda search, it: way(f"thin {search}")(search, it))
     monkeypatch.setattr(phases, "looking_closer", lambda search: "closely")
@@ -74,7 +73,6 @@ def test_a_search_climbs_descends_thins_and_asks_a_fresh_sample(ways):
     assert gone == [
         ("climb", "climb"),
         ("descend", "descend", 20),
-        ("within_limits", "descend"),
         ("last_sound", "descend"),
         ("stiffened", "descend"),
         ("thin leaving some as it is", "thin"),
@@ -91,7 +89,7 @@ def test_a_search_led_by_structures_thins_judged_by_more_of_them(ways):
     after["stiffened"] = {"phase": "lead"}
     after["led by closely"] = {"phase": "thin", "mind": "structures"}
     phases.run(searching(), iterate(phase="descend"))
-    assert [name for name, *_ in gone][3:] == [
+    assert [name for name, *_ in gone][2:] == [
         "stiffened",
         "led by closely",
         "thin leaving some closely",
@@ -103,7 +101,7 @@ def test_where_nothing_was_accepted_there_is_nothing_to_thin(ways):
     gone, after = ways
     after["last_sound"] = {"accepted": ()}
     phases.run(searching(), iterate(phase="descend"))
-    assert [name for name, *_ in gone][2:] == ["last_sound", "last_standing", "last_confirmed"]
+    assert [name for name, *_ in gone] == ["descend", "last_sound", "last_standing", "last_confirmed"]
 
 
 @pytest.mark.parametrize("each", [None, slice(0, 5)])
@@ -116,14 +114,13 @@ def test_without_thinning_the_last_design_that_stands_is_taken_or_a_sample_asked
     phases.run(search, iterate(phase="descend"))
     assert gone == [
         ("descend", "descend", 0),
-        ("within_limits", "descend"),
         ("last_sound", "descend"),
         ("last_standing", "descend"),
         ("last_confirmed", "descend"),
     ]
     gone.clear()
     phases.run(search, iterate(phase="descend", mind="structures"))
-    assert [name for name, *_ in gone] == ["descend", "within_limits", "last_sound", "agreed"]
+    assert [name for name, *_ in gone] == ["descend", "last_sound", "agreed"]
 
 
 def point(objective, name=""):
