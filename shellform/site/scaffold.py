@@ -2,9 +2,9 @@
 how shells with edge beams go up, and another way for those that stand on the ground.
 
     raising         the flat grid lies on props under every second crossing, which rise, and its rods' ends
-                    with them. At the share s of the way all are at s of their height on the target; in plan
-                    they move as they like, but for soft ropes that lead the ends to where bent rods bring
-                    them: s² of the way from their places in the flat grid to their seats
+                    with them. At the share s of the way the net between the layers is at s of its height on
+                    the target; in plan all move as they like, but for soft ropes that lead the ends to where
+                    bent rods bring them: s² of the way from their places in the flat grid to their seats
     drawing in      firmer ropes draw the ends to their seats
     pinning         the ends are pinned there, to the ground or to edge beams on props of their own
     clamping        the ends are turned to where they lie on the target, and clamped to the edge beams
@@ -12,8 +12,10 @@ how shells with edge beams go up, and another way for those that stand on the gr
     striking props  the edge beams' props go
 
 The net of which all heights are a share of the target's is nearly the target's own, less bent, and the grid
-finds it by itself where nothing holds it in plan; along given lines its ends don't let it. Where the target
-is steep, rods of less height are bent more at its foot: props stand where it is less steep than 60°.
+finds it by itself where nothing holds it in plan; along given lines its ends don't let it. Rods lie beside
+the net along its normal: were they at a share of their own heights, one layer would bend the other, and the
+more the narrower the grid. Where the target is steep, rods of less height are bent more at its foot: props
+stand where it is less steep than 60°.
 
 Where firmer supports take over, the forces of those that go are put on as dead loads and taken away bit by
 bit; so too where the scaffold and the beams' props go. Where that isn't stable, these are let down to where
@@ -43,8 +45,10 @@ from shellform.structure.solve.drive import Drive
 from shellform.structure.solve.equilibrium import Equilibrium, find_equilibrium
 from shellform.structure.solve.loading import advance
 
-# of 12 EI/l³, with which a rod's segment resists its end's moving aside: ropes that draw ends, that lead them
-_FIRM, _SOFT = 1.0, 0.03
+# Ropes that draw ends: of 12 EI/l³, with which a rod's segment resists its end's moving aside. Ropes that
+# lead them: of 12 EI/(l L²), L the shell's extent, so that off their lines by a share of L they bend the
+# segment by a share of what bends rods to the shell, however narrow the grid.
+_FIRM, _SOFT = 1.0, 10.0
 _PIECES = 10  # of raising, at least: on each the ropes' anchors move straight
 _SLIGHT = 1e-6  # of the force that bends a segment by its own length
 _ALIKE = 1e-6  # of the shell's extent, by which two paths to one state differ
@@ -104,6 +108,8 @@ class Scaffold:
         self.rods = own.chosen(np.flatnonzero(~(own.of_kind(EDGE) | own.of_kind(CLAMP))))
         bending = min(shell.rod.resized(unbraced.radius).stiffness.bending)
         self.resistance = 12.0 * bending / net.grid.scale**3
+        segments = np.ptp(shell.target.positions, axis=0).max() / net.grid.scale
+        self.firm, self.soft = _FIRM * self.resistance, _SOFT * self.resistance / segments**2
         self.slight = _SLIGHT * self.resistance * net.grid.scale
 
     def under(self, shell: Gridshell) -> Scaffold:
@@ -118,7 +124,7 @@ class Scaffold:
         """
         pinned = self._pinned()
         below, above = list[ErectionStep](), list[ErectionStep]()
-        firm, soft = self._roped(_FIRM, drawn=False), self._roped(_SOFT, drawn=True)
+        firm, soft = self._roped(self.firm, drawn=False), self._roped(self.soft, drawn=True)
         state = self._passed(firm, "pinning", pinned, self._handed(firm, pinned), (1.0, 0.0), below)
         state = self._passed(soft, "drawing in", state, self._handed(soft, state), (1.0, 0.0), below)
         self._flattened(soft, state, below)
@@ -227,11 +233,11 @@ class Scaffold:
         holding = Holding(self.ground, borne, props, self.slight)
         return Site(self.shell, design, assemble(network), holding)
 
-    def _roped(self, share: float, *, drawn: bool) -> Site:
-        """The grid on the scaffold, its ends drawn by ropes of that share of the rods' resistance."""
+    def _roped(self, stiffness: float, *, drawn: bool) -> Site:
+        """The grid on the scaffold, its ends drawn by ropes of that stiffness, N/m."""
         fixed = self._pins()
         fixed[self.seats, :2] = False
-        ropes = Ropes(self.seats, self.places[:, :2], share * self.resistance)
+        ropes = Ropes(self.seats, self.places[:, :2], stiffness)
         holding = Holding(self.ground, self.seats, self.props, self.slight, ropes, drawn)
         return Site(self.shell, self.unbraced, Assembly(len(fixed), (self.rods, ropes), fixed), holding)
 
@@ -250,10 +256,8 @@ class Scaffold:
     def _flattened(self, soft: Site, state: State, steps: list[ErectionStep]) -> None:
         """The way from the grid at its full height, led by `soft` ropes, to the flat one."""
         flat = laid_out(self.shell, self.seats).positions
-        level = self.ground - flat[self.on_rods, 2].min()
         lifted = np.union1d(self.props, self.seats)
-        down, back = np.zeros_like(self.weight), (flat[self.seats] - self.places)[:, :2]
-        down[lifted, 2] = flat[lifted, 2] + level - state.positions[lifted, 2]
+        none, back = np.zeros_like(self.weight), (flat[self.seats] - self.places)[:, :2]
         assert soft.holding is not None
         assert soft.holding.ropes is not None
         stiffness = soft.holding.ropes.stiffness
@@ -266,10 +270,26 @@ class Scaffold:
 
         pieces = max(_PIECES, round(1.0 / self.step))
         for k in range(pieces, 0, -1):
-            here, there = led(k / pieces), led((k - 1) / pieces)
-            drive = Drive(there - here, down / pieces, self.weight + here)
             shares = k / pieces, (k - 1) / pieces
+            here, there = led(shares[0]), led(shares[1])
+            down = none.copy()
+            down[lifted, 2] = self._heights(lifted, shares[1]) - state.positions[lifted, 2]
+            drive = Drive(there - here, down, self.weight + here)
             state = self._passed(soft, "raising", state, drive, shares, steps, widest=1.0)
+
+    def _heights(self, nodes: Indices, share: float) -> Reals:
+        """Heights (k,), m, of rods' nodes at that share of raising: of the net between the layers that share,
+        and of the rods' distances from it what is upright where the sine of its slope is that share of the
+        target's. At 0 the grid lies on the ground.
+        """
+        flat, target = self.shell.net.grid.flat, self.shell.target
+        low, high = flat[self.on_rods, 2].min(), flat[self.on_rods, 2].max()
+        aside = flat[nodes, 2] - 0.5 * (low + high)
+        middle = self.ground + 0.5 * (high - low)
+        upright = rotation.matrices(target.quaternions[nodes])[:, 2, 2]
+        net = target.positions[nodes, 2] - aside * upright
+        now = np.sqrt(1.0 - share**2 * (1.0 - upright**2))
+        return np.asarray(middle + share * (net - middle) + aside * now)
 
     def _eased(self, state: State, goal: State, moved: Flags) -> Drive:
         """Degrees of freedom (n, 6) that are held moved to where they are in another state."""

@@ -14,6 +14,7 @@ from shellform.site import erection as erection_module
 from shellform.site import scaffold
 from shellform.site.erection import erect
 from shellform.site.scaffold import Scaffold
+from shellform.structure.elements import rotation
 from shellform.structure.elements.sections import isotropic
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -23,15 +24,19 @@ from tests.net.edge_shells import barrel
 STAGES = ["raising", "drawing in", "pinning", "clamping", "lowering", "striking props", "tightening"]
 
 
-@pytest.fixture(scope="module")
-def arches():
+def vault(spacing=0.11, gap=0.002):
     """A barrel vault whose two arches hang on edge beams."""
     surface = barrel()
-    net = sf.pull_net(surface, spacing=0.11, gap=0.002, angle=np.deg2rad(45.0), elements=2)
+    net = sf.pull_net(surface, spacing=spacing, gap=gap, angle=np.deg2rad(45.0), elements=2)
     rod = sf.Rod.round(young=40e9, radius=0.0012, strength=600e6, density=2000.0)
-    joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
+    joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=gap)
     bundle = EdgeBeam(Bundle(0.0012, 19, 0.5, isotropic(young=40e9, density=2000.0, strength=600e6)))
     return sf.brace(stand(net, surface), rod, joint, sf.Cable(stiffness=187.0), below=surface, edge=bundle)
+
+
+@pytest.fixture(scope="module")
+def arches():
+    return vault()
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +99,29 @@ def test_on_the_way_up_rods_bear_hardly_more_than_when_they_are_up(erection):
     assert erection.worst.stress < 1.1 * raising[-1].stress
 
 
+def test_rods_of_a_narrow_grid_with_thick_joints_bear_no_more_than_their_share_on_the_way_up():
+    """Both layers of a steep grid rose in proportion, which the distance between them doesn't: 75 MPa at four
+    tenths of the way to 82, and 2.6 times their strength in a dome of 60 m."""
+    shell = vault(spacing=0.055, gap=0.012)
+    raising = of_stage(erect(shell, shell.unbraced(), step=0.5), "raising")
+    final = raising[-1].stress
+    for step in raising:
+        assert step.stress < 1.05 * step.share * final + 1e4
+
+
+def test_ropes_that_lead_ends_bend_rods_by_no_more_than_a_share_of_what_the_shell_does_however_narrow_the_grid(
+    arches,
+):
+    """A rope's pull k L bends the segment of length l at its end by k L l, the shell its rods by EI/L."""
+    shares = []
+    for shell in (arches, vault(spacing=0.055)):
+        held = Scaffold(shell, shell.unbraced(), np.zeros((shell.node_count, 6)), None, 0.5)
+        across, along = np.ptp(shell.target.positions, axis=0).max(), shell.net.grid.scale
+        shares.append(held.soft * across**2 * along / min(shell.rod.stiffness.bending))
+    assert shares[0] == pytest.approx(shares[1], rel=1e-12)
+    assert shares[0] == pytest.approx(120.0)
+
+
 def test_a_raised_grid_is_held_by_its_props_from_below_and_its_ropes_from_the_side_alone(arches, erection):
     props = scaffold._propped(arches, None)
     clamps = np.vstack([line.clamps for line in arches.net.edges])[:, 1]
@@ -105,11 +133,17 @@ def test_a_raised_grid_is_held_by_its_props_from_below_and_its_ropes_from_the_si
     assert step.props.pull == pytest.approx(max(-force[props, 2].min(), 0.0), rel=1e-6)
     assert step.props.rope == pytest.approx(np.linalg.norm(force[ends, :2], axis=1).max(), rel=1e-6)
     assert step.reaction == pytest.approx(np.abs(force[ends, 2]).max(), rel=1e-6)
-    # At half of the way all are at half of their heights.
-    ground = arches.target.positions[:, 2].min()
+    # At half of the way the net is at half of its height, its slope's sine at half of the target's: the lower
+    # rods, half a gap beside it, lie a little lower than at half of theirs.
+    upright = rotation.matrices(arches.target.quaternions[props])[:, 2, 2]
+    beside = 0.5 * arches.net.grid.gap
+    lowest = arches.target.positions[:, 2].min()
     final = of_stage(erection, "raising")[-1].state.positions[props, 2]
+    net = 0.5 * (lowest + beside) + 0.5 * (final + beside * upright)
+    now = np.cos(np.arcsin(0.5 * np.sqrt(1.0 - upright**2)))
     assert step.share == 0.5
-    np.testing.assert_allclose(step.state.positions[props, 2], 0.5 * (ground + final), atol=1e-9)
+    np.testing.assert_allclose(step.state.positions[props, 2], net - beside * now, atol=1e-9)
+    assert step.state.positions[props, 2].max() < 0.5 * (lowest + final).max()
     assert np.abs(force[:, :3].sum(axis=0)).max() < 1e-6 * step.props.push
     force[props, 2] = 0.0
     force[ends, :3] = 0.0
@@ -248,7 +282,6 @@ def test_a_single_prop_brings_up_a_small_vault(arches, erection):
     middle = np.argmax(arches.net.crossings[:, 2])
     done = erect(arches, arches.design(), props=arches.net.grid.crossing_nodes[middle], step=0.5)
     np.testing.assert_allclose(done.steps[-1].state.positions, erection.steps[-1].state.positions, atol=1e-8)
-    assert done.worst.stress > erection.worst.stress
 
 
 def test_ways_up_that_can_t_be_are_refused(arches, shell):
