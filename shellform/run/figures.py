@@ -18,6 +18,7 @@ from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import rod_forces
 from shellform.optimiser.optimum import by_constraint
+from shellform.output.pictures import maps
 from shellform.output.pictures.panel import Look, Paper
 from shellform.records import history
 from shellform.records.progress import Event, Kind, Report, unheard
@@ -29,7 +30,7 @@ from shellform.written import make_folder
 
 FAILURE = "states/failure.npz"  # of the stage "safety"
 _LOADS = {"none": "no load", "design": "design load", "additional": "additional load"}
-QUANTITIES = ("deviation", "utilisation", "curvature", "shear", "spring", "mode", "history")
+QUANTITIES = (*maps.QUANTITIES, "spring", "history")
 FILMS = ("pour", "erection")
 _STILL = ("spring", "mode", "history")  # of one state, or of none
 _FILMED = "Give --film erection, or leave it out."
@@ -198,7 +199,7 @@ def draw_maps(run: Run, *, report: Report = unheard) -> bool:
 def draw_failure(run: Run) -> list[Path]:
     """The shape in which the design to build most likely fails, its last stable state moved along the mode in
     which it gives way; nothing where none of its structures falls."""
-    from shellform.output.pictures import maps, render
+    from shellform.output.pictures import render
 
     file, told = run.folder / "figures/failure.png", run.summary.failure
     if told is None or not (run.folder / FAILURE).is_file():
@@ -311,7 +312,6 @@ def chosen(run: Run, design: str | None, load: str | None) -> tuple[list[str], l
 
 def panel_of(run: Run, design: str, load: str, quantity: str = "deviation") -> Any:
     """A design under a load."""
-    from shellform.output.pictures import maps
 
     title = f"{design} design, {_LOADS.get(load, f'load: {load}')}"
     state = run.states[design][load]
@@ -362,7 +362,6 @@ def write_states(
     beams.
     """
     from shellform.output.exchange import vtp
-    from shellform.output.pictures import maps
 
     labels = ("N", "Mx_a", "My_a", "Mz_a", "Mx_b", "My_b", "Mz_b")
     for each, state in states.items():

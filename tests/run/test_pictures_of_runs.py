@@ -284,7 +284,7 @@ def test_the_options_of_the_command_become_a_wish():
         ({"film": "pour", "by": "scaffold"}, r"--by: says how a grid is erected.*--film erection"),
         ({"film": "pour", "kind": "png"}, "Known: gif, mp4"),
         ({"kind": "gif"}, "Known: png, svg, pdf"),
-        ({"quantity": "colour"}, "Known: deviation, utilisation, curvature, shear, spring, mode, history"),
+        ({"quantity": "colour"}, "Known: deviation, utilisation, curvature, shear, mode, spring, history"),
         ({"size": "640"}, "WIDTHxHEIGHT"),
         ({"limit": 0.0}, "--limit: must be positive"),
     ],
