@@ -11,7 +11,8 @@ from shellform.problem.engineering import BROKEN, ConnectorTurn
 
 class LimitsEntry(Entry):
     """What an engineer limits besides constraints (5) and (6), each under every load case and without load,
-    but deviations, which count where the concrete hardens and where it is poured; left out: not limited.
+    but deviations, which count where the concrete hardens and where it is poured, and slack_min, which holds
+    under slack_loads; left out: not limited.
     """
 
     deviation: PositiveFloat | None = Field(

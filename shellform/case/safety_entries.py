@@ -75,7 +75,7 @@ class SafetyEntry(Entry):
         0,
         multiple_of=10,
         description="structures a level of the subset simulation that tells how rarely the design to build falls: "
-        "with 200, one in a thousand takes some 600 structures; 0: not asked",
+        "with 200, one in a thousand takes some 560 structures; 0: not asked",
     )
     confidence: float = Field(0.95, gt=0.0, lt=1.0, description="of the probability that is told")
     seed: NonNegativeInt = Field(0, description="of the drawing; the search draws others")
