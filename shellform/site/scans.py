@@ -5,8 +5,11 @@ The points are laid onto the predicted nodes by a rigid motion (no scaling), fou
 (Besl and McKay 1992): each marker takes its nearest point, one point to one marker and none beyond a reach,
 the best motion for the pairs follows in closed form (Kabsch 1976), and so on until the pairs stay the same.
 The iteration finds the motion nearest to its start only, so that it starts from many: the principal axes of
-both sets laid over each other, turned about their common normal and flipped. The best wins; a second pairing
-that fits nearly as well makes the match doubtful, which is said and not guessed.
+both sets laid over each other, turned about their common normal and flipped. Where markers at one side are
+hidden, middles lie more than half a cell of the grid apart, and points come to rest beside the markers that
+they are: so from the best of some that are turned otherwise each neighbouring marker is tried, as long as
+that fits better. The best of all wins; a second pairing that fits nearly as well makes the match doubtful,
+which is said and not guessed.
 """
 
 from __future__ import annotations
@@ -26,11 +29,14 @@ from shellform.site.measurements import names_in, numbered_cells, too_many_cells
 from shellform.structure.elements.state import State
 from shellform.surface.units import unit_factor
 
+_OTHERWISE = 4  # ways that points are turned, from which neighbours are tried
+_BESIDE = 8  # nearest markers onto which all are moved on from where they came to rest
 _TURNS = 24  # starts about the common normal, each also flipped
 _ROUNDS = 60  # of closest points from one start
 # times the median distance from the middle: such points don't take part in the axes of the start
 _STRAY = 3.0
 _RIVAL = 1.5  # a second pairing whose cost is below this much times the best one's makes the match doubtful
+_TURNED = 5.0  # degrees: two motions that differ by less are shifted
 _PAIRS = 4  # three points and one to check them
 _THIN = 0.02  # second principal size over the first, below which points lie on a line
 
@@ -86,6 +92,10 @@ class Match(Record):
         found = self.point >= 0
         result[found] = self.motion(points[self.point[found]])
         return result
+
+
+_Fitted = tuple[float, Indices, Motion]
+"""What closest points came to: the cost, the marker (k,) of each point or -1, and the motion."""
 
 
 def read_points(path: str | Path, *, unit: str = "m") -> Reals:
@@ -195,20 +205,65 @@ def match(points: Reals, markers: Reals, *, reach: float, placed: bool = False) 
         return _named(cloud, markers, pairs, Motion(np.eye(3), np.zeros(3)), ())
     found = [_closest(tree, cloud, markers, start, reach) for start in _starts(cloud, markers)]
     found.sort(key=lambda each: each[0])
-    cost, pairs, motion = found[0]
-    rivals = [other[0] for other in found[1:] if not np.array_equal(other[1], pairs)]
-    doubts: tuple[str, ...] = ()
-    if rivals and rivals[0] < _RIVAL * cost:
-        other = next(each for each in found[1:] if not np.array_equal(each[1], pairs))
-        swing = np.degrees(
-            np.arccos(np.clip(0.5 * (np.trace(other[2].turn @ motion.turn.T) - 1.0), -1.0, 1.0))
-        )
-        doubts = (
-            f"Turned by {swing:.0f}° the points fit nearly as well ({rivals[0] / cost:.2f} times the cost): "
-            "mark the grid less symmetrically, "
-            "or give the points in the model's axes.",
-        )
-    return _named(cloud, markers, pairs, motion, doubts)
+    for begun in _turned_otherwise(found):
+        best = begun
+        while True:
+            moved_on = _one_marker_on(tree, markers, best[1], best[2])
+            beside = [_closest(tree, cloud, markers, start, reach) for start in moved_on]
+            found += beside
+            nearer = min(beside, key=lambda each: each[0], default=best)
+            if nearer[0] >= best[0]:
+                break
+            best = nearer
+    cost, pairs, motion = min(found, key=lambda each: each[0])
+    rivals = [other for other in found if not np.array_equal(other[1], pairs)]
+    rival = min(rivals, key=lambda each: each[0], default=None)
+    if rival is None or rival[0] >= _RIVAL * cost:
+        return _named(cloud, markers, pairs, motion, ())
+    doubt = (
+        f"{_from_one_to_other(motion, rival[2], cloud, reach)} the points fit nearly as well ({rival[0] / cost:.2f} times the cost): "
+        "mark the grid less symmetrically, or give the points in the model's axes."
+    )
+    return _named(cloud, markers, pairs, motion, (doubt,))
+
+
+def _from_one_to_other(one: Motion, other: Motion, cloud: Reals, reach: float) -> str:
+    """By what two motions differ: "Turned by 180°", or "Shifted by 0.5 m" where they differ by that alone."""
+    swing = _swing(one, other)
+    far = np.linalg.norm(np.median(other(cloud) - one(cloud), axis=0))
+    return f"Turned by {swing:.0f}°" if swing >= _TURNED or far < reach else f"Shifted by {far:.2g} m"
+
+
+def _swing(one: Motion, other: Motion) -> float:
+    """The angle between two motions, degrees."""
+    return float(np.degrees(np.arccos(np.clip(0.5 * (np.trace(other.turn @ one.turn.T) - 1.0), -1.0, 1.0))))
+
+
+def _turned_otherwise(found: Sequence[_Fitted]) -> list[_Fitted]:
+    """The first of these, and after it the first that are turned against those before; a few."""
+    chosen: list[_Fitted] = []
+    for each in found:
+        if len(chosen) < _OTHERWISE and all(_swing(other[2], each[2]) >= _TURNED for other in chosen):
+            chosen.append(each)
+    return chosen
+
+
+def _one_marker_on(tree: cKDTree, markers: Reals, pairs: Indices, motion: Motion) -> list[Motion]:
+    """The motion, and after it what brings all markers to those beside them, as far as there are any: as the
+    middle one of the pairs comes to each of the nearest beside it."""
+    named = pairs[pairs >= 0]
+    if len(named) < _PAIRS:
+        return []
+    middle = np.median(markers[named], axis=0)
+    near = tree.query(middle, k=min(_BESIDE + 1, len(markers)))[1]
+    found = []
+    for step in markers[near[1:]] - markers[near[0]]:
+        far, onto = tree.query(markers + step)
+        kept = far < 0.5 * np.linalg.norm(step)
+        if kept.sum() >= _PAIRS:
+            on = rigid_fit(markers[kept], markers[onto[kept]])
+            found.append(Motion(on.turn @ motion.turn, on(motion.shift[None])[0]))
+    return found
 
 
 def _named(cloud: Reals, markers: Reals, pairs: Indices, motion: Motion, doubts: tuple[str, ...]) -> Match:
@@ -242,9 +297,7 @@ def _pairs(tree: cKDTree, cloud: Reals, reach: float) -> Indices:
     return result
 
 
-def _closest(
-    tree: cKDTree, cloud: Reals, markers: Reals, start: Motion, reach: float
-) -> tuple[float, Indices, Motion]:
+def _closest(tree: cKDTree, cloud: Reals, markers: Reals, start: Motion, reach: float) -> _Fitted:
     """Iterates closest points from a start; the cost is the sum of squares with every lost marker or point at
     the reach.
     """

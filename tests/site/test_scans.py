@@ -1,5 +1,6 @@
 """Points named after markers, by hand: pairs, starts, motions and doubts of small lopsided sets."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -145,6 +146,40 @@ def test_points_in_a_scanner_s_axes_and_in_any_order_are_named_and_strays_and_hi
     assert np.isnan(places[4]).all()
     assert np.isnan(found.distance[4])
     assert np.nanmax(found.distance) < 1e-9
+
+
+def field(across, along, height=0.2):
+    """Crossings of a shallow dome, 1 m apart, that leans a little."""
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(across), np.arange(along), indexing="ij"))
+    round_about = ((x - 0.5 * across) / across) ** 2 + ((y - 0.5 * along) / along) ** 2
+    leaning = height * (x / across) ** 3
+    return np.column_stack([x, y, height * across * (1.0 - 2.0 * round_about) + 3.0 * leaning])
+
+
+@pytest.mark.parametrize(("across", "hidden"), [(20, 0), (30, 2), (40, 5)])
+def test_points_of_a_large_grid_are_named_rightly_though_rows_of_markers_at_one_side_are_hidden(
+    across, hidden
+):
+    """The middles lie half of that many rows apart. It had named 98 % of the points, all of them after the
+    marker one row farther, where 3 % were hidden."""
+    markers = field(across, 24)
+    order = np.random.default_rng(3).permutation(np.arange(24 * hidden, len(markers)))
+    noise = 0.002 * np.random.default_rng(4).normal(size=(len(order), 3))
+    cloud = (markers[order] + noise) @ TURN.T + SHIFT
+    found = match(cloud, markers, reach=0.5)
+    assert found.point[order].tolist() == list(range(len(order)))
+    assert found.missing.tolist() == list(range(24 * hidden))
+    assert np.nanmax(found.distance) < 0.02
+
+
+def test_points_that_fit_a_row_farther_nearly_as_well_are_doubted():
+    """A flat field without its rim looks the same from each of its crossings."""
+    markers = field(12, 12, height=0.0) * [1.0, 1.3, 1.0]
+    inner = markers[((markers > 0.5) & (markers < [10.5, 10.5 * 1.3, 1.0]))[:, :2].all(axis=1)]
+    off = 0.02 * np.random.default_rng(5).normal(size=inner.shape)
+    found = match(inner[:-1] + off[:-1], markers, reach=0.4)
+    assert found.doubts
+    assert re.match(r"(Turned by \d+°|Shifted by \d\.\d m) the points fit nearly as well", found.doubts[0])
 
 
 def test_points_that_are_placed_already_stay_where_they_are_and_tell_how_far_off_they_are():
