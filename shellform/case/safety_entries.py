@@ -30,6 +30,7 @@ class TolerancesEntry(Entry):
     supports: PlaceDeviation | None = _deviation("m, each coordinate", "supports")
     marks: PlaceDeviation | None = _deviation("m, of crossings along rods", "marks")
     rod_stiffness: _Share | None = _deviation("share, of each rod", "rod_stiffness")
+    tape: _Share | None = _deviation("share, of all lengths along a rod", "tape")
     rod_bow: _Share | None = _deviation("rise over length of each rod", "rod_bow")
     connectors: _Share | None = _deviation("share", "connectors")
     load_each: _Share | None = _deviation("share, of each crossing's load", "load_each")

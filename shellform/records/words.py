@@ -48,6 +48,7 @@ _CAUSES = {
     "shape": "the shape's imperfection",
     "cable_stiffness_all": "all cables' stiffness",
     "connectors_all": "all connectors' stiffness",
+    "tape": "the tapes that rods are marked by",
 }
 
 

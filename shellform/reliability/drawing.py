@@ -8,10 +8,11 @@ order and on however many threads.
 
 What errors do to the stress-free state. Marks: with errors e_0 .. e_q along a rod, the segment between two
 marks is longer by e_{i+1} - e_i, its elements in proportion; the rod stays straight, so that no frame
-changes. A rod's own arc of rise b L has the curvature k = 8 b / L; clamps are tightened on rods held straight
-in the flat grid, so that connectors keep their frames and the axes at the ends of the rod's elements are
-turned: with the curvature k (a vector across the axis, in the axes of the stress-free state) an element of
-length l has its ends turned by -k l / 2 and k l / 2 against its chord when nothing bends it, so that
+changes. A tape that is off by a share lengthens all segments of a rod by it. A rod's own arc of rise b L has
+the curvature k = 8 b / L; clamps are tightened on rods held straight in the flat grid, so that connectors
+keep their frames and the axes at the ends of the rod's elements are turned: with the curvature k (a vector
+across the axis, in the axes of the stress-free state) an element of length l has its ends turned by -k l / 2
+and k l / 2 against its chord when nothing bends it, so that
 
     F_a' = R(k l / 2) F_a,   F_b' = R(-k l / 2) F_b.
 
@@ -89,6 +90,7 @@ def sizes(members: Members) -> dict[str, int]:
         "shape": SOFT_MODES,
         "cable_stiffness_all": 1,
         "connectors_all": 1,
+        "tape": rods,
     }
 
 
@@ -118,7 +120,7 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
     )
     made = members.rod_elements
     off = np.diff(t.marks * z["marks"][made.marks], axis=1)[:, 0]
-    longer = np.maximum(off / made.segment_length, _LEAST - 1.0)
+    longer = np.maximum(off / made.segment_length + t.tape * z["tape"][made.rod_of], _LEAST - 1.0)
     length[made.elements] = longer[made.segment] * members.beam_length[made.elements]
     stiff = np.exp(t.rod_stiffness * z["rod_stiffness"])
     stiffness[made.elements], stiffness[made.locks] = stiff[made.rod], stiff[made.locked]

@@ -25,6 +25,7 @@ from shellform.surface.units import unit_factor
 
 _ABOVE = 3.0  # times its noise: what is left of a survey by chance alone stays below
 _FAR = 5.0  # times the others' median: a point that is off by itself
+_FAR_OFF = 0.02  # of the shell's extent, by which structures as built may be off
 _MOST = 3  # of such points are named
 _UNLIKELY = 4.0  # times its usual error: by chance one cable in 16,000 is that far off
 _TOGETHER = 0.5  # of what is left: where a rigid motion leaves less, the axes are off, not the grid
@@ -49,7 +50,7 @@ def read_survey(
 ) -> Surveyed:
     """The survey in a CSV file, near the `expected` state; the model counts from `origin` (3,), m, in the
     survey's coordinates, which named nodes may have. Raises InputError where a named node lies more than half
-    a spacing from there, or points can't be laid onto the crossings."""
+    a spacing and a fiftieth of the shell's extent from there, or points can't be laid onto the crossings."""
     crossings, reach = shell.net.grid.crossing_nodes[:, 1], 0.5 * shell.net.spacing
     if not any(measurements.has_column(path, name) for name in ("node", "crossing")):
         points = read_points(path, unit=unit)
@@ -77,14 +78,18 @@ def read_survey(
     places, counted = measurements.counted_alike(places, there, origin, reach=shell.net.spacing)
     away = np.linalg.norm(places - there, axis=1)
     worst = int(np.argmax(away))
-    if away[worst] > reach:
+    far = (
+        f"{names[worst]} lies {1e3 * away[worst]:.1f} mm from where it is expected, more than half a spacing"
+    )
+    if away[worst] > max(reach, _FAR_OFF * float(np.ptp(expected.positions, axis=0).max())):
         raise InputError(
-            f"{names[worst]} lies {1e3 * away[worst]:.1f} mm from where it is expected, more than half a spacing",
+            far,
             where=str(path),
             remedy="Check the unit, the axes and the numbering; leave the columns node and crossing out to have points laid "
             "onto the model.",
         )
-    return Surveyed(nodes, places, names, counted=counted)
+    doubts = (f"{far}: check that it has its own number",) if away[worst] > reach else ()
+    return Surveyed(nodes, places, names, doubts, counted=counted)
 
 
 def doubtful(survey: Surveyed, before: Belief, after: Belief, *, noise: float) -> list[str]:

@@ -142,7 +142,7 @@ def test_marks_lengthen_the_elements_between_them_in_proportion_and_leave_each_a
     assert {name: len(z) for name, z in none.items()} == {
         "cable_length": 3, "cable_stiffness": 3, "supports": 2, "marks": 5, "rod_stiffness": 2, "rod_bow": 4,
         "connectors": 2, "load_each": 2, "load_all": 1, "load_uneven": 2, "shape": 3, "cable_stiffness_all": 1,
-        "connectors_all": 1,
+        "connectors_all": 1, "tape": 2,
     }  # fmt: skip
     z = none | {"marks": np.array([1.0, 3.0, -2.0, 5.0, 1.0])}
     found = errors_of(members, Tolerances(marks=0.1), z).beam_length
@@ -150,6 +150,16 @@ def test_marks_lengthen_the_elements_between_them_in_proportion_and_leave_each_a
     assert found == pytest.approx([0.05, -0.5, 0.15, -0.4, 0.0, 0.0, 0.0])
     found = errors_of(members, Tolerances(marks=0.6), z).beam_length
     assert found == pytest.approx([0.3, -1.6, 0.9, -2.4, 0.0, 0.0, 0.0])
+
+
+def test_a_tape_lengthens_all_of_a_rod_by_its_share_beside_what_marks_do():
+    members = two_rods()
+    none = {name: np.zeros(count) for name, count in sizes(members).items()}
+    z = none | {"marks": np.array([1.0, 3.0, -2.0, 5.0, 1.0]), "tape": np.array([1.0, -2.0])}
+    found = errors_of(members, Tolerances(tape=0.01), z).beam_length
+    assert found == pytest.approx([0.01, 0.02, 0.03, -0.08, 0.0, 0.0, 0.0])
+    found = errors_of(members, Tolerances(marks=0.1, tape=0.01), z).beam_length
+    assert found == pytest.approx([0.06, -0.48, 0.18, -0.48, 0.0, 0.0, 0.0])
 
 
 def test_rods_bow_and_stiffen_with_their_locks_and_connectors_each_and_all_together():

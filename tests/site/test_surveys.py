@@ -15,6 +15,7 @@ SHELL = SimpleNamespace(
     net=SimpleNamespace(spacing=0.4, grid=SimpleNamespace(crossing_nodes=np.array([[0, 1], [2, 3], [2, 4]])))
 )
 STATE = SimpleNamespace(positions=POSITIONS)
+NARROW = SimpleNamespace(net=SimpleNamespace(spacing=0.5, grid=SHELL.net.grid))
 NOISE = 0.2e-3
 
 
@@ -62,6 +63,28 @@ def test_named_nodes_may_have_the_coordinates_of_the_survey_that_the_model_count
     if any(zero):
         with pytest.raises(InputError, match="from where it is expected"):
             read_survey(file, shell, STATE, unit="m")
+
+
+@pytest.mark.parametrize(
+    ("off", "answer"), [(0.2, "taken"), (0.3, "doubted"), (0.39, "doubted"), (0.41, "refused")]
+)
+def test_a_named_node_of_a_narrow_grid_may_be_off_by_a_fiftieth_of_the_extent_and_is_doubted_from_half_a_spacing_on(
+    monkeypatch, tmp_path, off, answer
+):
+    """Shells are off by a share of their span, however near their crossings: 207 mm at 0.5 m."""
+    state = SimpleNamespace(positions=POSITIONS * [5.0, 5.0, 1.0])  # 20 m
+    places = state.positions + np.array([[0.0, 0.0, off if k == 2 else 0.0] for k in range(5)])
+    monkeypatch.setattr(surveys.measurements, "has_column", lambda path, name: name == "node")
+    monkeypatch.setattr(surveys.measurements, "read_places", lambda path, shell: (np.arange(5), places))
+    monkeypatch.setattr(surveys.measurements, "named_by", lambda path: "node")
+    if answer == "refused":
+        with pytest.raises(InputError, match=r"node 2 lies 410\.0 mm from"):
+            read_survey(tmp_path, NARROW, state, unit="m")
+        return
+    doubts = read_survey(tmp_path, NARROW, state, unit="m").doubts
+    assert [each.partition(",")[0] for each in doubts] == (
+        [] if answer == "taken" else [f"node 2 lies {1e3 * off:.1f} mm from where it is expected"]
+    )
 
 
 def test_points_without_names_are_laid_onto_the_crossings_within_half_a_spacing(monkeypatch, tmp_path):
