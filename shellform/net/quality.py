@@ -26,7 +26,9 @@ from shellform.surface.shape.tree import Tree
 from shellform.surface.shape.triangles import triangle_areas
 
 _FAR = 0.1  # of the spacing: a net farther from the surface is refused
-SPACING_ERROR = 0.005  # of the spacing: more is told, and not proposed; rods bend to 2.9 spacings there
+SPACING_ERROR = (
+    0.005  # of the spacing: more is told, and not proposed; rods bend to 2.9 spacings, or 100 gaps
+)
 _OVERLAP = 0.4  # of the spacing: nearer to each other two crossings that aren't neighbours lie on one another
 _BARE = 0.75  # of the spacing: the middle of a cell lies half a spacing from the next rod
 _SAMPLE = 0.25  # of the spacing, between points at which the cover is looked for
@@ -203,8 +205,9 @@ def refuse_distance(quality: Quality, grid: Grid, state: State) -> None:
 
 def nearness(quality: Quality, grid: Grid, state: State) -> str:
     """Where neighbouring crossings lie nearer than their spacing or farther, by more than `SPACING_ERROR`, in
-    words; empty where none do. Where a rod of length s bends to a radius R its chord is s²/(24 R²)
-    shorter."""
+    words; empty where none do. Where a rod of length s bends to a radius R its chord is s²/(24 R²) shorter;
+    and crossings are counted in the middle between two rods g apart, where they lie g/(2 R) nearer or farther
+    than along the rods' own axes."""
     error = quality.spacing_error
     if quality.spacing_error_max <= SPACING_ERROR:
         return ""
@@ -213,8 +216,8 @@ def nearness(quality: Quality, grid: Grid, state: State) -> str:
     place = points[neighbours(grid)[0][worst]].mean(axis=0).round(3).tolist()
     return (
         f"crossings at {place} lie {100.0 * abs(error[worst]):.2f} % {'nearer' if error[worst] < 0.0 else 'farther'} "
-        f"than their spacing, where up to {100.0 * SPACING_ERROR:.2f} % is usual: rods bend there to a radius of less "
-        "than three spacings"
+        f"than their spacing, where up to {100.0 * SPACING_ERROR:.2f} % is usual: rods are bent there too sharply for "
+        "their spacing or the gap between them"
     )
 
 

@@ -60,6 +60,7 @@ from shellform.run.sizes import (
     first_spacing,
     hopeless,
     least_spacing,
+    may_sag,
     practical,
     rest_ratio_for,
     rope_for,
@@ -291,14 +292,14 @@ class _Search:
         self, placed: Placed, choice: RodChoice, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
         """The design with these rods and this load, and the lightest edge beams with which it stands. Single
-        rods of which drawn structures fall, or whose cables are pulled too much, give way to two layers,
-        which cost no more and spare more than heavier edge beams."""
-        spare = more_come(choice, self.layers)
+        rods of which drawn structures fall, or that break, or whose cables are pulled too much, give way to
+        two layers, which cost no more and spare more than heavier edge beams."""
+        spare, far = more_come(choice, self.layers), may_sag(self.surface, thickness)
         for edge in edge_choices(choice)[self.lightest : self.lightest + HEAVY]:
             result = self.with_edges(placed, choice, edge, spacing, thickness)
-            if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result)):
+            if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result, far)):
                 break
-            if spare and result.why in (Why.SCATTER, Why.CABLES):
+            if spare and result.why in (Why.SCATTER, Why.STRENGTH, Why.CABLES):
                 break
         return result
 
@@ -363,7 +364,7 @@ class _Search:
         stress = {Why.EDGES: tried.edge, Why.CABLES: tried.pull}.get(why, tried.stress)
         place = tried.most_stressed if why is Why.STRENGTH else tried.where
         return parts, tried, Obstacle(
-            why, spacing, thickness, tried.factor, parts.choice, placed, place, stress
+            why, spacing, thickness, tried.factor, parts.choice, placed, place, stress, tried.sag
         )  # fmt: skip
 
     def _followed(self, placed: Placed, parts: FirstParts, thickness: float) -> Followed:

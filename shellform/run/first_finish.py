@@ -31,11 +31,10 @@ from shellform.run.first_trial import (
     followed,
 )
 from shellform.run.next_trial import fails_by
-from shellform.run.sizes import Placed, RodChoice, may_come_off, thicker
+from shellform.run.sizes import Placed, RodChoice, may_come_off, may_sag, thicker
 from shellform.run.unbuildable import Obstacle
 from shellform.surface.shape.target import Surface
 
-_SAGS = 2.0  # times what the shape may be off, of edges under the additional load: beyond it heavier beams are tried
 _STRAIGHTER = 0.8  # of the sag before, at the most, for which edge beams are made heavier
 _FAR = 4.0  # times what the shape may be off, of the shell under the additional load: farther off, it is made stiffer
 _NEARER = 0.85  # of the deviation before, at the most, for which it is
@@ -57,7 +56,7 @@ def straighter(
     """The design on the first heavier edge beams that don't sag too far; where all do, on the last that help
     and with which it stands."""
     choice, thickness = design.parts.choice, design.thickness
-    edges, far = edge_choices(choice), _SAGS * may_come_off(surface, thickness)
+    edges, far = edge_choices(choice), may_sag(surface, thickness)
     for edge in edges[edges.index(design.parts.edge) + 1 :]:
         if design.tried.sag <= far or allowance.over:
             break

@@ -70,11 +70,14 @@ def relieved(parts: FirstParts, follow: Callable[[FirstParts], Followed]) -> tup
     return parts, tried
 
 
-def edges_may_help(failure: Obstacle) -> bool:
-    """Whether stronger edge beams may."""
-    falls = failure.why in _FALLS
-    gives_way = failure.why in (Why.EDGES, Why.CABLES)  # cables are pulled where edges move
-    return gives_way or (falls and failure.nearness(NEEDED) >= _NEAR * NEEDED)
+def edges_may_help(failure: Obstacle, far: float) -> bool:
+    """Whether stronger edge beams may: where they give way, where a shell that nearly bears its load falls,
+    or where they sag by more than `far`, m, beside rods that break."""
+    if failure.why in (Why.EDGES, Why.CABLES):  # cables are pulled where edges move
+        return True
+    if failure.why is Why.STRENGTH:
+        return failure.factor >= NEEDED and failure.sag > far
+    return failure.why in _FALLS and failure.nearness(NEEDED) >= _NEAR * NEEDED
 
 
 def finer_is_vain(nearest: Obstacle, area: float, spacing: float, finer: float) -> bool:

@@ -40,6 +40,7 @@ CURVED = 600  # crossings for the sake of curvature, at the most: what asks for 
 _USUAL = 1.0  # m, of rods on site
 THICKNESS = 0.05  # m: usual
 OF_SPAN = 500.0  # such a part of its span a shell may be off, or half its thickness
+_SAGS = 2.0  # times that far edges may sag under the additional load
 BUILT_OF_SPAN = 50.0  # such a part any structure as built may be, or its thickness
 _SLENDER = 80.0  # thicknesses across the larger side of a model, on which 50 mm would be a block
 _DEPTH = 7.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
@@ -193,6 +194,12 @@ def may_come_off(surface: Surface, thickness: float) -> float:
     7.4.1, lets concrete be bent in use; but half its thickness in any case, since the thrust line of the
     shape as designed lies in it up to that."""
     return max(0.5 * thickness, width(surface) / OF_SPAN)
+
+
+def may_sag(surface: Surface, thickness: float) -> float:
+    """How far edges may sag under the additional load, m, before heavier beams are tried: no cable lifts
+    them."""
+    return _SAGS * may_come_off(surface, thickness)
 
 
 def may_stray(surface: Surface, thickness: float) -> float:

@@ -121,7 +121,7 @@ class Why(Enum):
 class Obstacle(Record):
     """How an attempt failed: `why`, at which `spacing` and `thickness`, m, up to which `factor` of its load
     it stood, with which `choice` of rods on which net (`placed`), `where` (3,), m, the rods' `stress` over
-    their strength, or the net's own `error`."""
+    their strength and how far edge beams `sag`, m, under the additional load, or the net's own `error`."""
 
     why: Why
     spacing: float
@@ -131,6 +131,7 @@ class Obstacle(Record):
     placed: Placed | None = None
     where: Reals | None = None
     stress: float = 0.0
+    sag: float = 0.0
     error: NoNet | Stalled | None = None
 
     def near(self, needed: float) -> tuple[float, float]:

@@ -45,7 +45,7 @@ FALLS = Obstacle(Why.SCATTER, 0.5, 0.05, 1.5)
     ],
 )
 def test_edge_beams_are_made_heavier_while_edges_sag_far_and_that_helps(monkeypatch, sags, off, kept):
-    monkeypatch.setattr(first_finish, "may_come_off", lambda surface, thickness: off)
+    monkeypatch.setattr(first_finish, "may_sag", lambda surface, thickness: 2.0 * off)
     found = [FALLS if sag is None else design(sag, edge) for sag, edge in zip(sags, EDGES, strict=False)]
 
     def with_edges(placed, choice, edge, spacing, thickness):
@@ -59,7 +59,7 @@ def test_edge_beams_are_made_heavier_while_edges_sag_far_and_that_helps(monkeypa
 
 
 def test_heavier_edge_beams_are_those_after_the_ones_with_which_a_design_stands(monkeypatch):
-    monkeypatch.setattr(first_finish, "may_come_off", lambda surface, thickness: 0.01)
+    monkeypatch.setattr(first_finish, "may_sag", lambda surface, thickness: 0.02)
     asked = []
     straighter(
         design(0.3, EDGES[2]),

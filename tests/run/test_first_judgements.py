@@ -3,6 +3,7 @@ came to is stood in for, so that each case is the one that is meant."""
 
 import itertools
 from collections import namedtuple
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -284,11 +285,12 @@ def test_rods_edge_beams_and_cables_are_judged_under_the_additional_load(monkeyp
     ],
 )
 def test_stronger_edge_beams_are_tried_where_edges_give_way_or_the_shell_nearly_stands(why, factor, may):
-    assert next_trial.edges_may_help(Obstacle(why, 0.5, 0.05, factor)) is may
+    assert next_trial.edges_may_help(Obstacle(why, 0.5, 0.05, factor), 0.1) is may
 
 
 GIVES_WAY = Obstacle(Why.EDGES, 0.5, 0.05, 1.5, stress=1.2)
 BREAKS = Obstacle(Why.STRENGTH, 0.5, 0.05, 1.5, stress=1.2)
+SAGS = replace(BREAKS, sag=0.11)
 SCATTERS = Obstacle(Why.SCATTER, 0.5, 0.05, 1.5, stress=0.5)
 PULLS = Obstacle(Why.CABLES, 0.5, 0.05, 1.5, stress=1.3)
 
@@ -298,7 +300,9 @@ PULLS = Obstacle(Why.CABLES, 0.5, 0.05, 1.5, stress=1.3)
     [
         (0, ("line",), (1, 2), [GIVES_WAY, GIVES_WAY], [0, 1]),  # two a stage
         (2, ("line",), (1, 2), [GIVES_WAY, GIVES_WAY], [2, 3]),
-        (0, ("line",), (1, 2), [BREAKS], [0]),
+        (0, ("line",), (1,), [BREAKS], [0]),
+        (0, ("line",), (1,), [SAGS, SAGS], [0, 1]),
+        (0, ("line",), (1, 2), [SAGS], [0]),  # two layers come first
         (0, ("line",), (1, 2), [STANDS], [0]),
         (0, (), (1, 2), [GIVES_WAY], [0]),  # there are none
         (0, ("line",), (1, 2), [SCATTERS], [0]),  # two layers come first
@@ -318,7 +322,8 @@ def test_edge_beams_are_tried_from_the_lightest_of_their_stage_on(
 
     monkeypatch.setattr(first_design, "edge_choices", lambda choice: (0, 1, 2, 3))
     monkeypatch.setattr(first_design, "FirstDesign", str)
-    search = SimpleNamespace(lightest=lightest, layers=layers, with_edges=with_edges)
+    monkeypatch.setattr(first_design, "may_sag", lambda surface, thickness: 2.0 * thickness)
+    search = SimpleNamespace(surface=None, lightest=lightest, layers=layers, with_edges=with_edges)
     placed = SimpleNamespace(net=SimpleNamespace(edges=lines))
     assert (
         _Search._stands(search, placed, Choice(sf.Rod.round(young=40e9, radius=0.01).section), 0.5, 0.05)

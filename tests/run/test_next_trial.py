@@ -1,5 +1,6 @@
 """Which section, and how much concrete, comes after a failure: by hand-computed shares."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -179,17 +180,21 @@ def test_of_the_failures_with_as_much_concrete_and_spacing_the_one_that_bears_mo
 
 
 @pytest.mark.parametrize(
-    ("factor", "tried", "may"),
+    ("factor", "tried", "sag", "may"),
     [
-        (1.21, Why.STABILITY, True),
-        (1.19, Why.STABILITY, False),
-        (1.0, Why.EDGES, True),
-        (1.6, Why.CABLES, True),
-        (1.6, Why.STRENGTH, False),
+        (1.21, Why.STABILITY, 0.0, True),
+        (1.19, Why.STABILITY, 0.2, False),
+        (1.0, Why.EDGES, 0.0, True),
+        (1.6, Why.CABLES, 0.0, True),
+        (1.5, Why.STRENGTH, 0.1, False),
+        (1.5, Why.STRENGTH, 0.11, True),
+        (1.49, Why.STRENGTH, 0.11, False),
     ],
 )
-def test_stronger_edge_beams_may_help_from_four_fifths_of_what_is_needed_on(factor, tried, may):
-    assert next_trial.edges_may_help(failed(tried, factor)) is may
+def test_stronger_edge_beams_may_help_from_four_fifths_of_what_is_needed_on_and_where_they_sag_beside_rods_that_break(
+    factor, tried, sag, may
+):
+    assert next_trial.edges_may_help(replace(failed(tried, factor), sag=sag), 0.1) is may
 
 
 def parts(ratio=0.996, swivels=False, diameter=0.006):

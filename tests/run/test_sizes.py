@@ -107,6 +107,7 @@ def test_a_shape_may_be_off_by_a_500th_of_its_span_or_half_its_concrete(monkeypa
     monkeypatch.setattr(sizes, "width", lambda _: 15.0)
     assert sizes.may_come_off(surface(), 0.05) == pytest.approx(0.03)
     assert sizes.may_come_off(surface(), 0.07) == pytest.approx(0.035)
+    assert sizes.may_sag(surface(), 0.07) == pytest.approx(0.07)
     assert sizes.whole_mm(0.0129) == 0.012
 
 
