@@ -30,7 +30,6 @@ class TolerancesEntry(Entry):
     supports: PlaceDeviation | None = _deviation("m, each coordinate", "supports")
     marks: PlaceDeviation | None = _deviation("m, of crossings along rods", "marks")
     rod_stiffness: _Share | None = _deviation("share, of each rod", "rod_stiffness")
-    tape: _Share | None = _deviation("share, of all lengths along a rod", "tape")
     rod_bow: _Share | None = _deviation("rise over length of each rod", "rod_bow")
     connectors: _Share | None = _deviation("share", "connectors")
     load_each: _Share | None = _deviation("share, of each crossing's load", "load_each")
@@ -42,6 +41,9 @@ class TolerancesEntry(Entry):
     )
     connectors_all: _Share | None = Field(
         None, description=f"share, of all connectors together; left out: 0, {SOURCES['connectors_all']}"
+    )
+    tape: _Share | None = Field(
+        None, description=f"share, of all lengths along a rod; left out: 0, {SOURCES['tape']}"
     )
 
 

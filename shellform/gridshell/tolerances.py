@@ -43,8 +43,9 @@ SOURCES: Final[Mapping[str, str]] = {
     "supports": "DIN 18202 table 1 permits 10 mm in plan up to 1 m between points that are set out, two "
     "deviations; in a workshop (spans of 2 to 4 m): ISO 2768-1, class m, 2 mm, two deviations; scale "
     "model: drilled base plate, 0.1 mm",
-    "marks": "scribed to 1 mm; in a workshop (spans of 2 to 4 m): ISO 2768-1, class m, of the longest rod, two "
-    "deviations; scale model: 0.2 mm",
+    "marks": "scribed to 1 mm, beside half of what a tape of class II may be off (2004/22/EC: 0.3 mm + 0.2 "
+    "mm/m); in a workshop (spans of 2 to 4 m): ISO 2768-1, class m, of the longest rod, two deviations; scale "
+    "model: 0.2 mm",
     "rod_stiffness": "JCSS Probabilistic Model Code part 3.2, modulus of elasticity: coefficient of "
     "variation 0.03",
     "rod_bow": "EN 10219-2 (tubes) and EN 13706-2 (pultruded profiles): bow of 0.2 % of the length, two "
@@ -61,8 +62,8 @@ SOURCES: Final[Mapping[str, str]] = {
     "causes don't hold; scale model: what callipers leave, 0.1 mm in a metre",
     "cable_stiffness_all": "the maker's mean modulus is taken as tested, unless a doubt about it is given here",
     "connectors_all": "the make's mean stiffness is taken as tested, unless a doubt about it is given here",
-    "tape": "a tape of class II is off by up to 0.2 mm/m (2004/22/EC), two deviations, and alike along a rod; in "
-    "a workshop (spans of 2 to 4 m) and of a scale model it is in the marks",
+    "tape": "counted in the marks, each for itself, unless it is given here: 1e-4 of a tape of class II, with marks "
+    "of 1 mm",
 }
 
 
@@ -142,7 +143,7 @@ def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float)
     """The defaults for a shell of that `span`, its longest rod and cable, m (SOURCES)."""
     for name, value in (("span", span), ("longest_rod", longest_rod)):
         require_number(value, above=0.0, where=name, give="metres, such as 0.9")
-    model, tape = span < SCALE_MODEL_BELOW, 0.0
+    model = span < SCALE_MODEL_BELOW
     if model:
         cable_length, supports, marks = 1e-4, 1e-4, 2e-4
     elif span < WORKSHOP_BELOW:
@@ -150,7 +151,7 @@ def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float)
         marks = 0.5 * _medium(longest_rod)
     else:
         cable_length, supports = 2e-3 + longest_cable / 5000.0, 5e-3
-        marks, tape = 1e-3, 1e-4
+        marks = 1e-3 + 0.5 * (0.3e-3 + 0.2e-3 * longest_rod)
     return Tolerances(
         cable_length=cable_length,
         cable_stiffness=0.05,
@@ -163,7 +164,6 @@ def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float)
         load_all=0.05,
         load_uneven=0.01 if model else 0.05,
         shape=1e-4 if model else 5e-4,
-        tape=tape,
     )
 
 
