@@ -51,6 +51,7 @@ def survey(
 ) -> None:
     """Tell the crew which turnbuckles to turn, from a survey of the erected grid."""
     from shellform.run import onsite
+    from shellform.structure.solve.memory import limited_to_free_memory
 
     if (measured is None) == (replay is None):
         raise InputError(
@@ -69,9 +70,12 @@ def survey(
         cables=cables,
         after=after,
     )
-    if replay is not None:
-        tell_lines(
-            onsite.replay(run, options, rounds=replay, seed=seed, slip=slip, markers=markers, output=output)
-        )
-    elif measured is not None:
-        tell_lines(onsite.survey(run, measured, options, output))
+    with limited_to_free_memory():  # it holds how every node answers to every cable
+        if replay is not None:
+            tell_lines(
+                onsite.replay(
+                    run, options, rounds=replay, seed=seed, slip=slip, markers=markers, output=output
+                )
+            )
+        elif measured is not None:
+            tell_lines(onsite.survey(run, measured, options, output))
