@@ -26,9 +26,7 @@ from shellform.surface.shape.tree import Tree
 from shellform.surface.shape.triangles import triangle_areas
 
 _FAR = 0.1  # of the spacing: a net farther from the surface is refused
-SPACING_ERROR = (
-    0.005  # of the spacing: more is told, and not proposed; rods bend to 2.9 spacings, or 100 gaps
-)
+SPACING_ERROR = 0.005  # of the spacing: more is told, and not proposed (2.9 spacings of radius, or 100 gaps)
 _OVERLAP = 0.4  # of the spacing: nearer to each other two crossings that aren't neighbours lie on one another
 _BARE = 0.75  # of the spacing: the middle of a cell lies half a spacing from the next rod
 _SAMPLE = 0.25  # of the spacing, between points at which the cover is looked for

@@ -45,7 +45,8 @@ class RodElements(Record):
     - `elements` (e,) among the beams, with the `rod` of each and its `sense` along it; `locks` (l,) among the
       beams, with the rod of each, `locked`.
     - `segment` (e,): that of each element between two marks; `marks` (s, 2): those at both ends of each
-      segment among all rods' marks; `segment_length` (s,), m; `rod_of` (s,) each; `rod_length` (r,), m.
+      segment among all rods' marks; `segment_length` (s,), m, and the rod of each, `segment_rod` (s,);
+      `rod_length` (r,), m.
     """
 
     elements: Indices
@@ -56,7 +57,7 @@ class RodElements(Record):
     segment: Indices
     marks: Indices
     segment_length: Reals
-    rod_of: Indices
+    segment_rod: Indices
     rod_length: Reals
 
 
@@ -93,8 +94,8 @@ class Members(Record):
         counts = np.concatenate([none, *(np.diff(rod.marks) for rod in rods)])  # of elements in segments
         nominal = self.beam_length[elements]
         number = np.arange(len(rods))
-        rod_of = np.repeat(number, [len(rod.marks) - 1 for rod in rods])
-        first = np.arange(len(counts)) + rod_of
+        segment_rod = np.repeat(number, [len(rod.marks) - 1 for rod in rods])
+        first = np.arange(len(counts)) + segment_rod
         begins = np.cumsum(counts) - counts
         return RodElements(
             elements=elements,
@@ -105,7 +106,7 @@ class Members(Record):
             segment=np.repeat(np.arange(len(counts)), counts),
             marks=np.stack([first, first + 1], axis=1),
             segment_length=np.add.reduceat(nominal, begins) if len(counts) else np.zeros(0),
-            rod_of=rod_of,
+            segment_rod=segment_rod,
             rod_length=np.array([self.beam_length[rod.elements].sum() for rod in rods]),
         )
 

@@ -35,6 +35,7 @@ from shellform.arrays import Flags, Indices, Reals, indices
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.edge_beams import CLAMP, EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.tolerances import span_of
 from shellform.site.erection_steps import SMALLEST, ErectionStep, Holding, Site, laid_out
 from shellform.structure.elements import rotation
 from shellform.structure.elements.ropes import Ropes
@@ -65,8 +66,7 @@ def _propped(shell: Gridshell, props: ArrayLike | None) -> Indices:
     lower, upper = grid.crossing_nodes.T
     if props is None:
         second = grid.lattice.sum(axis=1) % 2 == 0
-        upright = rotation.matrices(shell.target.quaternions[lower])[:, 2, 2]
-        return np.asarray(lower[second & (upright >= _STEEPEST)])
+        return np.asarray(lower[second & (_upright(shell, lower) >= _STEEPEST)])
     given = indices("props", props, (None,), below=grid.node_count)
     under = np.arange(grid.node_count)
     under[upper] = lower
@@ -80,6 +80,11 @@ def _propped(shell: Gridshell, props: ArrayLike | None) -> Indices:
             remedy="Name crossings, or nodes of rods: edge beams have props of their own.",
         )
     return nodes
+
+
+def _upright(shell: Gridshell, nodes: Indices) -> Reals:
+    """The cosine (k,) of the target's slope at rods' nodes."""
+    return np.asarray(rotation.matrices(shell.target.quaternions[nodes])[:, 2, 2])
 
 
 class Scaffold:
@@ -107,10 +112,9 @@ class Scaffold:
         own = shell.beams(unbraced.radius)
         self.rods = own.chosen(np.flatnonzero(~(own.of_kind(EDGE) | own.of_kind(CLAMP))))
         bending = min(shell.rod.resized(unbraced.radius).stiffness.bending)
-        self.resistance = 12.0 * bending / net.grid.scale**3
-        segments = np.ptp(shell.target.positions, axis=0).max() / net.grid.scale
-        self.firm, self.soft = _FIRM * self.resistance, _SOFT * self.resistance / segments**2
-        self.slight = _SLIGHT * self.resistance * net.grid.scale
+        resistance = 12.0 * bending / net.grid.scale**3
+        self.firm, self.soft = _FIRM * resistance, _SOFT * resistance * (net.grid.scale / span_of(shell)) ** 2
+        self.slight = _SLIGHT * resistance * net.grid.scale
 
     def under(self, shell: Gridshell) -> Scaffold:
         """The same scaffold under the shell as it is once something has been built into it."""
@@ -257,7 +261,7 @@ class Scaffold:
         """The way from the grid at its full height, led by `soft` ropes, to the flat one."""
         flat = laid_out(self.shell, self.seats).positions
         lifted = np.union1d(self.props, self.seats)
-        none, back = np.zeros_like(self.weight), (flat[self.seats] - self.places)[:, :2]
+        back = (flat[self.seats] - self.places)[:, :2]
         assert soft.holding is not None
         assert soft.holding.ropes is not None
         stiffness = soft.holding.ropes.stiffness
@@ -272,7 +276,7 @@ class Scaffold:
         for k in range(pieces, 0, -1):
             shares = k / pieces, (k - 1) / pieces
             here, there = led(shares[0]), led(shares[1])
-            down = none.copy()
+            down = np.zeros_like(self.weight)
             down[lifted, 2] = self._heights(lifted, shares[1]) - state.positions[lifted, 2]
             drive = Drive(there - here, down, self.weight + here)
             state = self._passed(soft, "raising", state, drive, shares, steps, widest=1.0)
@@ -282,12 +286,9 @@ class Scaffold:
         and of the rods' distances from it what is upright where the sine of its slope is that share of the
         target's. At 0 the grid lies on the ground.
         """
-        flat, target = self.shell.net.grid.flat, self.shell.target
-        low, high = flat[self.on_rods, 2].min(), flat[self.on_rods, 2].max()
-        aside = flat[nodes, 2] - 0.5 * (low + high)
-        middle = self.ground + 0.5 * (high - low)
-        upright = rotation.matrices(target.quaternions[nodes])[:, 2, 2]
-        net = target.positions[nodes, 2] - aside * upright
+        grid, upright = self.shell.net.grid, _upright(self.shell, nodes)
+        aside, middle = grid.layer[nodes], self.ground + 0.5 * grid.gap
+        net = self.shell.target.positions[nodes, 2] - aside * upright
         now = np.sqrt(1.0 - share**2 * (1.0 - upright**2))
         return np.asarray(middle + share * (net - middle) + aside * now)
 

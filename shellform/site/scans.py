@@ -206,15 +206,7 @@ def match(points: Reals, markers: Reals, *, reach: float, placed: bool = False) 
     found = [_closest(tree, cloud, markers, start, reach) for start in _starts(cloud, markers)]
     found.sort(key=lambda each: each[0])
     for begun in _turned_otherwise(found):
-        best = begun
-        while True:
-            moved_on = _one_marker_on(tree, markers, best[1], best[2])
-            beside = [_closest(tree, cloud, markers, start, reach) for start in moved_on]
-            found += beside
-            nearer = min(beside, key=lambda each: each[0], default=best)
-            if nearer[0] >= best[0]:
-                break
-            best = nearer
+        found += _beside(tree, cloud, markers, begun, reach)
     cost, pairs, motion = min(found, key=lambda each: each[0])
     rivals = [other for other in found if not np.array_equal(other[1], pairs)]
     rival = min(rivals, key=lambda each: each[0], default=None)
@@ -246,6 +238,20 @@ def _turned_otherwise(found: Sequence[_Fitted]) -> list[_Fitted]:
         if len(chosen) < _OTHERWISE and all(_swing(other[2], each[2]) >= _TURNED for other in chosen):
             chosen.append(each)
     return chosen
+
+
+def _beside(tree: cKDTree, cloud: Reals, markers: Reals, begun: _Fitted, reach: float) -> list[_Fitted]:
+    """What is found when all are moved on to markers beside theirs, and from the best again, as long as it
+    fits better."""
+    best, found = begun, list[_Fitted]()
+    while True:
+        starts = _one_marker_on(tree, markers, best[1], best[2])
+        beside = [_closest(tree, cloud, markers, start, reach) for start in starts]
+        found += beside
+        nearer = min(beside, key=lambda each: each[0], default=best)
+        if nearer[0] >= best[0]:
+            return found
+        best = nearer
 
 
 def _one_marker_on(tree: cKDTree, markers: Reals, pairs: Indices, motion: Motion) -> list[Motion]:

@@ -17,6 +17,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals, Record
 from shellform.errors import InputError, how_many
 from shellform.gridshell.gridshell import Gridshell
+from shellform.gridshell.tolerances import span_of
 from shellform.site import measurements
 from shellform.site.retensioning import Belief
 from shellform.site.scans import match, read_points, rigid_fit
@@ -81,7 +82,7 @@ def read_survey(
     far = (
         f"{names[worst]} lies {1e3 * away[worst]:.1f} mm from where it is expected, more than half a spacing"
     )
-    if away[worst] > max(reach, _FAR_OFF * float(np.ptp(expected.positions, axis=0).max())):
+    if away[worst] > max(reach, _FAR_OFF * span_of(shell)):
         raise InputError(
             far,
             where=str(path),

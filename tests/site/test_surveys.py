@@ -12,10 +12,12 @@ from shellform.site.surveys import Surveyed, doubtful, read_survey
 
 POSITIONS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 1.0, 0.5], [4.0, 4.0, 1.0]])
 SHELL = SimpleNamespace(
-    net=SimpleNamespace(spacing=0.4, grid=SimpleNamespace(crossing_nodes=np.array([[0, 1], [2, 3], [2, 4]])))
+    net=SimpleNamespace(spacing=0.4, grid=SimpleNamespace(crossing_nodes=np.array([[0, 1], [2, 3], [2, 4]]))),
+    target=SimpleNamespace(positions=POSITIONS),
 )
 STATE = SimpleNamespace(positions=POSITIONS)
-NARROW = SimpleNamespace(net=SimpleNamespace(spacing=0.5, grid=SHELL.net.grid))
+WIDE = SimpleNamespace(positions=POSITIONS * [5.0, 5.0, 1.0])  # 20 m
+NARROW = SimpleNamespace(net=SimpleNamespace(spacing=0.5, grid=SHELL.net.grid), target=WIDE)
 NOISE = 0.2e-3
 
 
@@ -52,7 +54,7 @@ def test_named_nodes_may_have_the_coordinates_of_the_survey_that_the_model_count
     ]
     file = tmp_path / "survey.csv"
     file.write_text("\n".join(["node,x,y,z", *lines]), encoding="utf-8")
-    shell = SimpleNamespace(net=SHELL.net, node_count=5)
+    shell = SimpleNamespace(net=SHELL.net, target=SHELL.target, node_count=5)
     found = read_survey(file, shell, STATE, unit="m", origin=(430_000.0, 81_000.0, 400.0))
     np.testing.assert_allclose(found.places, POSITIONS + np.array([0.0, 0.0, 0.01]), atol=1e-9)
     assert [*found.counted] == (
@@ -72,16 +74,15 @@ def test_a_named_node_of_a_narrow_grid_may_be_off_by_a_fiftieth_of_the_extent_an
     monkeypatch, tmp_path, off, answer
 ):
     """Shells are off by a share of their span, however near their crossings: 207 mm at 0.5 m."""
-    state = SimpleNamespace(positions=POSITIONS * [5.0, 5.0, 1.0])  # 20 m
-    places = state.positions + np.array([[0.0, 0.0, off if k == 2 else 0.0] for k in range(5)])
+    places = WIDE.positions + np.array([[0.0, 0.0, off if k == 2 else 0.0] for k in range(5)])
     monkeypatch.setattr(surveys.measurements, "has_column", lambda path, name: name == "node")
     monkeypatch.setattr(surveys.measurements, "read_places", lambda path, shell: (np.arange(5), places))
     monkeypatch.setattr(surveys.measurements, "named_by", lambda path: "node")
     if answer == "refused":
         with pytest.raises(InputError, match=r"node 2 lies 410\.0 mm from"):
-            read_survey(tmp_path, NARROW, state, unit="m")
+            read_survey(tmp_path, NARROW, WIDE, unit="m")
         return
-    doubts = read_survey(tmp_path, NARROW, state, unit="m").doubts
+    doubts = read_survey(tmp_path, NARROW, WIDE, unit="m").doubts
     assert [each.partition(",")[0] for each in doubts] == (
         [] if answer == "taken" else [f"node 2 lies {1e3 * off:.1f} mm from where it is expected"]
     )
