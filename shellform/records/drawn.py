@@ -69,6 +69,14 @@ def read_drawn(folder: Path, name: str, key: str) -> Drawn:
     return found if found.key == key else Drawn(key)
 
 
+def take_drawn(folder: Path, same: str, name: str, key: str) -> None:
+    """Takes over what was drawn of a design that is the `same`, where of the one of the `name` nothing is.
+    Raises InputError where it can't be written."""
+    found = read_drawn(folder, same, key)
+    if found.paths and not read_drawn(folder, name, key).paths:
+        write_drawn(folder, name, found)
+
+
 def write_drawn(folder: Path, name: str, drawn: Drawn) -> None:
     """Writes it whole or not at all. Raises InputError where it can't be written."""
     write_text(_file(folder, name), text_of(drawn))

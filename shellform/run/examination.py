@@ -10,7 +10,7 @@ how it is raised (raised.py).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -23,7 +23,7 @@ from shellform.case.entries import StockRodEntry
 from shellform.errors import NotConverged
 from shellform.records.as_built import falls, keeps_factor
 from shellform.records.checks import BUILT
-from shellform.records.drawn import DrawnPath
+from shellform.records.drawn import DrawnPath, take_drawn
 from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.progress import Event, Kind
 from shellform.records.summary import (
@@ -70,19 +70,27 @@ def examine(workspace: Workspace) -> Summary:
     entry = workspace.case.safety
     every = [_of_run(run, name) for name in run.designs]
     summary = fresh = run.summary.unexamined()
-    workspace.say("safety", f"critical factors of {len(every)} designs", Kind.BEGAN)
+    alike = _alike(every, entry.seed)
+    own = [each for each in every if each.name not in alike]
+    workspace.say("safety", f"critical factors of {len(own)} designs", Kind.BEGAN)
 
     def examined(each: Examined) -> DesignRecord:
         return _critical(workspace.case, each, fresh.designs[each.name])
 
-    for each, record in zip(every, side_by_side(examined, every), strict=True):
+    for each, record in zip(own, side_by_side(examined, own), strict=True):
         summary = summary.with_design(each.name, record)
+    for name, same in alike.items():
+        told, kept = summary.designs[same].loads, summary.designs[same].critical_factor_kept
+        record = replace(summary.designs[name], loads=told, critical_factor_kept=kept)
+        summary = summary.with_design(name, record)
     write_summary(workspace.folder, summary)
     sampled = [each for each in every if each.name != "unbraced"]
     routes = len(paths(run.loads))
     planned = routes * (entry.compared * len(sampled) + entry.drawn - entry.compared)
     clock = Clock(planned, _RAISING_TAKES)
     for each in sampled:
+        if each.name in alike:
+            take_drawn(workspace.folder, alike[each.name], each.name, each.key(entry.seed))
         summary = _stand(workspace, each, entry.compared, summary, clock)
     if entry.probability_additional is None and "initial" in run.designs:
         summary = _bar(workspace, _of_run(run, "initial"), summary, clock)
@@ -109,6 +117,14 @@ def examine(workspace: Workspace) -> Summary:
         if falls(summary.designs, best, asked_as_built(workspace.case)):
             summary = replace(summary, thicker=_thicker(workspace, run))
     return replace(summary, verdict=judged(replace(run, summary=summary)))
+
+
+def _alike(every: Sequence[Examined], seed: int) -> dict[str, str]:
+    """By name, of the designs that are the same as an earlier one the name of the first such: polishing may
+    have found none better."""
+    first: dict[str, str] = {}
+    named = [(each.name, first.setdefault(each.key(seed), each.name)) for each in every]
+    return {name: same for name, same in named if same != name}
 
 
 def _bar(workspace: Workspace, initial: Examined, summary: Summary, clock: Clock) -> Summary:

@@ -14,7 +14,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.gridshell.tolerances import SOURCES, default_tolerances
 from shellform.records.drawn import DrawnPath, DrawnSnap, read_drawn
 from shellform.records.progress import Kind
-from shellform.records.summary import read_summary
+from shellform.records.summary import read_summary, write_summary
 from shellform.reliability.perfect import perfect
 from shellform.reliability.probability import counted
 from shellform.reliability.safety import paths
@@ -217,6 +217,31 @@ def test_killed_inside_sampling_it_goes_on_and_ends_with_the_same_bytes(file, wh
         assert (copy / f"designs/{name}-drawn.json").read_bytes() == (
             whole[0] / f"designs/{name}-drawn.json"
         ).read_bytes()
+
+
+def test_of_designs_that_are_the_same_one_is_examined(file, copy, whole, monkeypatch):
+    """Where polishing found nothing better it took minutes more of a dome of 10,000 crossings."""
+    for each in [*copy.glob("designs/optimised.*"), *copy.glob("states/optimised*")]:
+        shutil.copy(each, each.with_name(each.name.replace("optimised", "polished")))
+    summary = read_summary(copy)
+    write_summary(copy, summary.with_design("polished", summary.designs["optimised"]))
+    followed, drawn = [], []
+    critical, load = examination._critical, Workshop.load_numbers
+
+    def follow(case, each, record):
+        followed.append(each.name)
+        return critical(case, each, record)
+
+    def count(self, *asked, numbers, **given):
+        drawn.extend(numbers)
+        return load(self, *asked, numbers=numbers, **given)
+
+    monkeypatch.setattr(examination, "_critical", follow)
+    monkeypatch.setattr(Workshop, "load_numbers", count)
+    run_case(load_case(file, FEW), copy, until="safety")
+    assert sorted(followed) == ["initial", "optimised", "unbraced"]
+    assert drawn == [*range(4), *range(4), *range(4, 12)], "the first four of it are those of the other"
+    assert read_summary(copy).designs["polished"].loads == read_summary(whole[0]).designs["optimised"].loads
 
 
 def test_how_rarely_it_falls_is_told_where_asked_for_and_goes_on_where_it_was_broken_off(
