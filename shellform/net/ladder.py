@@ -120,7 +120,7 @@ def climbed_net(
         notes = (*net.notes, *(NetNote(NoteKind.ATTEMPT, each.sentence()) for each in (*attempts, given)))
         return dataclasses.replace(net, notes=notes, attempts=(*attempts, given)), given
     assert first is not None
-    raise _refused(first, attempts, surface) from first
+    raise _refused(first, attempts, surface, spent) from first
 
 
 def _vain(rung: Rung, settings: NetSettings, first: NoNet | Stalled | None) -> bool:
@@ -144,8 +144,11 @@ def _changed(settings: NetSettings, rung: Rung) -> NetSettings:
     )
 
 
-def _refused(first: NoNet | Stalled, attempts: list[Attempt], surface: Surface) -> NoNet | Stalled:
-    """The first refusal, with what was tried besides and the surface's own radius."""
+def _refused(
+    first: NoNet | Stalled, attempts: list[Attempt], surface: Surface, spent: int
+) -> NoNet | Stalled:
+    """The first refusal, with what was tried besides, the surface's own radius, and the factorisations
+    `spent` by all attempts."""
     bent = largest_curvature(surface)
     radius = f" (it bends to a radius of {1.0 / bent:.3g} m)" if bent > 0.0 else ""
     others = ", ".join(sorted({each.reason.value for each in attempts if each.reason}))
@@ -153,6 +156,8 @@ def _refused(first: NoNet | Stalled, attempts: list[Attempt], surface: Surface) 
     what = f"{first.what}{radius}; {tried}"
     if isinstance(first, Stalled):
         return Stalled(
-            what, state=first.state, residual=first.residual, iterations=first.iterations, remedy=first.remedy
+            what, state=first.state, residual=first.residual, iterations=spent, remedy=first.remedy
         )
-    return NoNet(first.reason, what, where=first.where, value=first.value, remedy=first.remedy)
+    found = NoNet(first.reason, what, where=first.where, value=first.value, remedy=first.remedy)
+    found.factorisations = spent
+    return found

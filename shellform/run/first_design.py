@@ -101,8 +101,9 @@ def standing_design(
     surface: Surface, wish: DesignWish, say: Say, allowance: Allowance, *, finer: bool = False
 ) -> FirstDesign:
     """The first that stands; spacings begin with the usual one, or where that was tried with the next
-    `finer`. Raises InputError for a surface of absurd size, a flat one, or one that no net covers or no rod
-    follows, NotConverged where nothing stands; both with the reason and a way out."""
+    `finer`, unless that takes more crossings than a first design has. Raises InputError for a surface of
+    absurd size, a flat one, or one that no net covers or no rod follows, NotConverged where nothing stands;
+    both with the reason and a way out."""
     refuse_size(surface)
     refuse_flat(surface)
     if wish.thickness is not None:
@@ -159,8 +160,10 @@ class _Search:
 
     def that_holds(self, *, finer: bool) -> FirstDesign:
         """The first that stands."""
-        spacing = self._finer(self._first_spacing()) if finer else self._first_spacing()
-        thickness = self.wish.thickness or usual_thickness(self.surface)
+        spacing = self._first_spacing()
+        if finer and self.surface.area <= MOST_CROSSINGS * practical(_FINER * spacing) ** 2:
+            spacing = self._finer(spacing)
+        thickness = self._thickness
         for number in range(_SPACINGS):
             if number:
                 if self.wish.spacing is not None or self._vain(spacing, practical(_FINER * spacing)):
@@ -173,6 +176,11 @@ class _Search:
         return with_thinner_concrete(
             self.surface, self.wish, self.failures, self.best, self._stands, self.allowance
         )
+
+    @property
+    def _thickness(self) -> float:
+        """m, of concrete that is looked for."""
+        return self.wish.thickness or usual_thickness(self.surface)
 
     def _first_spacing(self) -> float:
         if self.wish.spacing is not None:
@@ -293,8 +301,10 @@ class _Search:
     ) -> FirstDesign | Obstacle:
         """The design with these rods and this load, and the lightest edge beams with which it stands. Single
         rods of which drawn structures fall, or that break, or whose cables are pulled too much, give way to
-        two layers, which cost no more and spare more than heavier edge beams."""
-        spare, far = more_come(choice, self.layers), may_sag(self.surface, thickness)
+        two layers, which cost no more and spare more than heavier edge beams. Only where concrete is thinned
+        do edges that sag give way to heavier ones: before that, other rods do better."""
+        spare, thinned = more_come(choice, self.layers), thickness < self._thickness
+        far = may_sag(self.surface, thickness) if thinned else math.inf
         for edge in edge_choices(choice)[self.lightest : self.lightest + HEAVY]:
             result = self.with_edges(placed, choice, edge, spacing, thickness)
             if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result, far)):

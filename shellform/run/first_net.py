@@ -2,16 +2,18 @@
 On a saddle these lie along its straight lines, where they bear nothing as arches; there the net across is
 told too.
 
-Pulls that fail end earlier here than in a design: nets that are found take up to a hundred factorisations.
-Where no angle gives a net, the ladder (net/ladder.py) is climbed from the one whose failure costs least to
-mend, with fewer factorisations for larger nets; not on surfaces that are tried as a way out, of which the
-next rounder one is more likely to take a net than another attempt on this one.
+Angles are tried side by side, on as many cores as there are; what comes of them is judged in order, so that
+it is the same on any number. Pulls that fail end earlier here than in a design: nets that are found take up
+to a hundred factorisations. Where no angle gives a net, the ladder (net/ladder.py) is climbed from the one
+whose failure costs least to mend, with fewer factorisations for larger nets; not on surfaces that are tried
+as a way out, of which the next rounder one is more likely to take a net than another attempt on this one.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,6 +27,7 @@ from shellform.net.quality import refuse_nearness
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_trial import ELEMENTS
 from shellform.run.sizes import MOST_CROSSINGS, Placed
+from shellform.structure.elements.threads import in_turn
 from shellform.surface.shape.target import Surface
 
 ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
@@ -36,7 +39,8 @@ _PULL, _BRIEF = 110, 70  # factorisations of one pull
 _PULLS, _USUAL_CROSSINGS = 450, 300  # factorisations of failed pulls, for so many crossings
 _LARGEST = 20.0  # times the usual crossings: hours of a processor before a design must have been found
 WORK = 37_500  # crossings pulled and solved, ways out included: about one and a half minutes of an idle processor
-_STALLED = 4  # times the work of a pull that ends, one that stalls
+_CLIMBED = 4  # times the work of a pull that ends, a ladder climbed with success
+_A_PULL, _AT_ONCE = 40, 5  # factorisations that count as one pull; at the least, where it ends before any
 Say = Callable[[str], None]
 
 
@@ -46,12 +50,14 @@ class Allowance:
     solved; and how much is `left` of it. Seconds aren't asked, so that a surface ends at the same place on
     any machine, however busy. What a part spends the `whole` spends too, and where that is over so is the
     part. Whether it is `thorough`: climbs the ladder where no angle gives a net, and tries finer spacings
-    where no section stands; whether it `thins` concrete then. Of what was found last, the `angle`, degrees,
-    of the net, and what share of its load the shell `bore` at the most."""
+    where no section stands; whether it `thins` concrete then, and to `thin_layers`, less than is poured at
+    once, too. Of what was found last, the `angle`, degrees, of the net, and what share of its load the shell
+    `bore` at the most."""
 
     work: int = WORK
     thorough: bool = True
     thins: bool = True
+    thin_layers: bool = False
     angle: float | None = None
     bore: float = 0.0
     whole: Allowance | None = None
@@ -71,9 +77,15 @@ class Allowance:
         than a first design has by itself, which each trial then takes."""
         return cls(round(larger(surface, spacing) * WORK))
 
-    def part(self, share: float, *, thorough: bool = True, thins: bool = True) -> Allowance:
+    def part(self, share: float) -> Allowance:
         """Another one, that may spend a `share` of this one's work."""
-        return Allowance(round(share * self.work), thorough, thins, whole=self)
+        return Allowance(round(share * self.work), whole=self)
+
+    def rest(
+        self, share: float, *, thorough: bool = True, thins: bool = True, thin_layers: bool = False
+    ) -> Allowance:
+        """Another one, that may spend a `share` of what is left of this one's work."""
+        return Allowance(round(share * self.left), thorough, thins, thin_layers, whole=self)
 
     def leave(self, share: float) -> None:
         """Sees to it that a `share` of its work is left, at the cost of what else the whole is for."""
@@ -123,32 +135,38 @@ def least_bent_net(
     limit = _PULL if allowance.thorough else _BRIEF
     settings = NetSettings(spacing=spacing, gap=gap, elements=ELEMENTS, tuning=NetTuning(limit=limit))
 
-    def at(angle: float, offset: tuple[float, float]) -> Placed | NoNet | Stalled:
-        crossings = surface.area / spacing**2
-        where = f"net at {angle:g}°, {spacing:g} m"
+    def attempt(place: tuple[float, tuple[float, float]]) -> Placed | NoNet | Stalled:
+        angle, offset = place
         try:
             net = net_at(surface, settings, angle=math.radians(angle), offset=offset)
             refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
-            say(f"{where}: {error.reason.value}")
-            allowance.spend(crossings, _STALLED if isinstance(error, Stalled) else 1)
             return error
-        allowance.spend(crossings)
-        tell(f"{where}: rods bend to a radius of {bends_to(net):.3g} m")
         return Placed(net, angle, offset)
 
+    def counted(found: Placed | NoNet | Stalled, angle: float) -> Placed | NoNet | Stalled:
+        crossings, where = surface.area / spacing**2, f"net at {angle:g}°, {spacing:g} m"
+        if isinstance(found, Placed):
+            allowance.spend(crossings)
+            tell(f"{where}: rods bend to a radius of {bends_to(found.net):.3g} m")
+        else:
+            allowance.spend(crossings * _share_of_pull(_taken(found)))
+            say(f"{where}: {found.reason.value}")
+        return found
+
     pulled: list[Placed | NoNet | Stalled] = []
-    for angle in angles:
-        if pulled and allowance.over:
-            break
-        pulled.append(at(angle, (0.0, 0.0)))
+    with closing(in_turn(attempt, [(angle, (0.0, 0.0)) for angle in angles])) as attempts:
+        for found, angle in zip(attempts, angles, strict=True):
+            pulled.append(counted(found, angle))
+            if allowance.over:
+                break
     nets = [each for each in pulled if isinstance(each, Placed)]
     if nets:
         best = _least_bent(nets)
         most = (1.0 + 2.0 * _ALIKE) * best.net.quality.curvature_max
         near = [each.angle for each in nets if each.net.quality.curvature_max <= most][:2]
         across = _across(best, nets)
-        moved = at(best.angle, (0.5, 0.5)) if shifted else None
+        moved = counted(attempt((best.angle, (0.5, 0.5))), best.angle) if shifted else None
         best = _least_bent([best, moved]) if isinstance(moved, Placed) else best
         further = dict.fromkeys([*near, *([across.angle] if across else [])])
         return FirstNets(best, tuple(further), across)
@@ -159,16 +177,21 @@ def least_bent_net(
     left = _worth(surface, spacing) - sum(_taken(each) for each in pulled if not isinstance(each, Placed))
     if allowance.over or not allowance.thorough or left <= 0:
         raise failed
-    allowance.spend(_STALLED * surface.area / spacing**2)
-    net, given = climbed_net(
-        surface,
-        settings,
-        angle=math.radians(angles[first]),
-        most=left + _taken(failed),
-        failed=failed,
-        near=False,
-        progress=tell,
-    )
+    crossings = surface.area / spacing**2
+    try:
+        net, given = climbed_net(
+            surface,
+            settings,
+            angle=math.radians(angles[first]),
+            most=left + _taken(failed),
+            failed=failed,
+            near=False,
+            progress=tell,
+        )
+    except (NoNet, Stalled) as error:
+        allowance.spend(crossings * _share_of_pull(_taken(error) - _taken(failed)))
+        raise
+    allowance.spend(_CLIMBED * crossings)
     return FirstNets(Placed(net, math.degrees(given.angle), given.offset), ())
 
 
@@ -228,8 +251,13 @@ def _worth(surface: Surface, spacing: float) -> int:
     return round(_PULLS * min(1.0, _USUAL_CROSSINGS * spacing**2 / surface.area))
 
 
+def _share_of_pull(factorisations: int) -> float:
+    """What pulls that failed cost, by the factorisations that they took, in pulls that end with a net."""
+    return max(factorisations, _AT_ONCE) / _A_PULL
+
+
 def _taken(error: NoNet | Stalled) -> int:
-    """Factorisations of a pull that failed."""
+    """Factorisations of pulls that failed."""
     return error.iterations if isinstance(error, Stalled) else error.factorisations
 
 

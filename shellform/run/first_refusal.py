@@ -21,9 +21,10 @@ from shellform.net.edges import stretches_of
 from shellform.run.first_design import standing_design
 from shellform.run.first_net import Allowance
 from shellform.run.first_steadier import strays, with_strays
+from shellform.run.first_thinner import least_layer
 from shellform.run.first_trial import FirstDesign
 from shellform.run.plinths import plinths_for
-from shellform.run.sizes import DesignWish
+from shellform.run.sizes import DesignWish, usual_thickness
 from shellform.run.unbuildable import Falls, Tips, Unbuildable, Why, flat_between_creases
 from shellform.run.way_out import BUILDABLE, COVERED, Nearest, nearest_buildable, renewed
 from shellform.surface.shape.target import Surface
@@ -33,11 +34,15 @@ _FLAT_SHARES = (1.0, 1.8)  # of a radius that makes a vault of flat pieces
 _WELL_COVERED = 1.4 * COVERED  # spacings: of COVERED itself half the nets are bent a little too much
 _APART = 1.3  # from one to the next, at the least
 _FURTHER = 1.7  # times the largest radius, where it helps nothing
-_TRIED = 0.27  # of the work that a surface is worth: on rounded ones, on these again on walls, and with less concrete
+_TRIED = 0.8  # of the work that is left: on rounded surfaces, on these again on walls, and with less concrete
 _WALLED = 0.4  # on walls, with which large nets are tried once
-_NEARLY = 0.5  # of the load needed, that a shell has to bear which is tried thoroughly
+_NEARLY = (
+    0.2  # of the load needed, that a shell has to bear which is tried thoroughly, with less concrete too
+)
 _WALLS = "--edges wall"
+_THICKNESS = "--thickness"
 _TAKEN = "--way-out"
+_FIRST_LAYER = ": pour that first, and the rest when it has hardened"
 Refusal = InputError | NotConverged
 Say = Callable[[str], None]
 
@@ -90,12 +95,12 @@ def with_ways_out(
         way_out = _on_walls(surface, wish, say, whole.part(_WALLED))
     if way_out is None and isinstance(refusal, Unbuildable) and not wish.rod:
         again = _Rounded(wish, whole, say)
-        way_out = _to_nearest(refusal, surface, output, again, say)
+        way_out = _to_nearest(refusal, surface, wish, output, again, say)
         if way_out is None:
             refusal = refusal.untried() if again.too_late else refusal.in_vain()
-            way_out = _poured_first(refusal, surface, wish, say, whole.part(_TRIED))
+            way_out = _poured_first(refusal, surface, wish, say, whole.rest(_TRIED))
     if way_out is None and isinstance(refusal, Falls) and _may_be_less(refusal, wish) and not whole.over:
-        way_out = _poured_first(refusal, surface, wish, say, whole.part(_TRIED))
+        way_out = _poured_first(refusal, surface, wish, say, whole.rest(_TRIED))
         refusal = refusal if way_out is not None else refusal.in_vain()
     return Refused(refusal, way_out)
 
@@ -113,7 +118,7 @@ def steadier_on_walls(surface: Surface, wish: DesignWish, say: Say, allowance: A
 
 
 def _to_nearest(
-    refusal: Unbuildable, surface: Surface, output: Path, again: _Rounded, say: Say
+    refusal: Unbuildable, surface: Surface, wish: DesignWish, output: Path, again: _Rounded, say: Say
 ) -> WayOut | None:
     """The nearest surface that can be built, on walls where it falls otherwise; None where none was found."""
     folder = _unused(output.with_name(f"{output.stem}-{BUILDABLE}"))
@@ -129,7 +134,8 @@ def _to_nearest(
     if nearest is None:
         return None
     assert again.design is not None
-    return WayOut(again.design, again.wish, nearest.told, nearest.file)
+    layer = "" if wish.thickness == again.wish.thickness else _FIRST_LAYER
+    return WayOut(again.design, again.wish, f"{nearest.told}{layer}", nearest.file)
 
 
 def shares(refusal: Unbuildable) -> list[float]:
@@ -165,9 +171,9 @@ class _Rounded:
     """The search on a rounded surface for what stands, within the work of all such trials; on walls too where
     a net covers it that falls on edge beams.
 
-    Trials are brief, so that rounder surfaces have their turn. Where none stands, finer spacings, for which
-    brief trials have no time, are tried on the `best` one, with all the work that is left: the one that bore
-    most, or the roundest, where no net covered any."""
+    Trials are brief, so that rounder surfaces have their turn. Where none stands, what brief trials have no
+    time for is tried on the `best` one, with all the work that is left: finer spacings, and concrete as thin
+    as it has to be. The best is the one that bore most, or the roundest, where no net covered any."""
 
     def __init__(self, wish: DesignWish, whole: Allowance, say: Say) -> None:
         self.design: FirstDesign | None = None  # of the last surface, where one stands
@@ -180,8 +186,8 @@ class _Rounded:
         self._begun = self._covered = False
         self._say = say
         self._whole = whole
-        self._brief = whole.part(_TRIED, thorough=False, thins=False)
-        self._walled = whole.part(_TRIED, thorough=False)
+        self._brief = whole.rest(_TRIED, thorough=False, thins=False)
+        self._walled = whole.rest(_TRIED, thorough=False)
 
     @property
     def may_stand(self) -> bool:
@@ -190,9 +196,9 @@ class _Rounded:
         return worth and self.wish.spacing is None and not self._whole.over
 
     def go_on(self) -> None:
-        """With finer spacings."""
+        """With finer spacings and thinner concrete."""
         self._finer, self._share = True, self.best.share
-        self._brief = self._walled = self._whole.part(1.0)
+        self._brief = self._walled = self._whole.rest(1.0, thin_layers=True)
 
     def in_turn(self, shares: Sequence[float]) -> Iterator[float]:
         """The shares of the radius, each while its surface is tried."""
@@ -230,6 +236,8 @@ class _Rounded:
             raise
         if wish.edges != self.wish.edges:
             self.wish, self.options = replace(self.wish, edges=wish.edges), _WALLS
+        self.wish, layer = _with_layer(self.wish, surface, design)
+        self.options = f"{self.options} {layer}".strip()
         return design
 
 
@@ -274,6 +282,14 @@ def _on_walls(surface: Surface, wish: DesignWish, say: Say, allowance: Allowance
     )
 
 
+def _with_layer(wish: DesignWish, surface: Surface, design: FirstDesign) -> tuple[DesignWish, str]:
+    """The wish for what stands with less concrete than is poured at once, and the option of the command that
+    says so; as it was, and "", for others."""
+    if wish.thickness is not None or design.thickness >= least_layer(usual_thickness(surface)):
+        return wish, ""
+    return replace(wish, thickness=design.thickness), f"{_THICKNESS} {design.thickness:g}"
+
+
 def _may_be_less(refusal: Unbuildable | Falls, wish: DesignWish) -> bool:
     """Whether less concrete is known to be borne, and no other was asked for."""
     return refusal.bears is not None and wish.thickness is None
@@ -295,5 +311,5 @@ def _poured_first(
     return WayOut(
         design,
         layer,
-        f"With --thickness {refusal.bears:g} this goes on: pour that first, and the rest when it has hardened",
+        f"With {_THICKNESS} {refusal.bears:g} this goes on{_FIRST_LAYER}",
     )

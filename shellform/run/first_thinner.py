@@ -32,29 +32,37 @@ def with_thinner_concrete(
     allowance: Allowance,
 ) -> FirstDesign:
     """The design that `stands` with the thickest concrete, after the `failures` of which one came `nearest`.
-    Raises what says why there is none where less than a layer is left, or another was asked for."""
+    Raises what says why there is none where less than a layer is left, unless that will do, or another was
+    asked for."""
     failure = bears_most(failures, nearest)
     if failure.choice is None or failure.placed is None or failure.why in (Why.CURVATURE, Why.SPACING):
         raise refused(surface, failure, wish)
     if not allowance.thins:
         raise refused(surface, nearest, wish)
     thickness = failure.thickness
-    least = min(LEAST_THICKNESS, 0.5 * thickness)
+    least = least_layer(thickness)
     outcomes: list[tuple[Obstacle, FirstDesign | None]] = []
+    tried = [own.choice for own in failures if _alike(own, failure) and own.choice is not None]
     for each in dict.fromkeys((failure, least_stressed(failures, failure))):
         allowance.leave(_THINNING)
         assert each.choice is not None
         assert each.placed is not None
         possible = choices(each.placed.net, each.spacing, wish.rod, layers_of(each.choice.section))
-        outcomes.append(thinned(each, nearest, possible, least, stands, lambda: allowance.over))
+        outcomes.append(thinned(each, nearest, possible, least, stands, lambda: allowance.over, tried))
         if _thickness(outcomes[-1]) >= least:
             break
     told, design = max(outcomes, key=_thickness)
     if design is None:
         raise refused(surface, told, wish)
-    if wish.thickness is not None or design.thickness < least:
+    too_thin = design.thickness < least and not allowance.thin_layers
+    if wish.thickness is not None or too_thin:
         raise refused(surface, replace(told, thickness=thickness), wish, bears=design.thickness)
     return design
+
+
+def least_layer(thickness: float) -> float:
+    """What is poured at once at the least, m, where a `thickness` is to be reached."""
+    return min(LEAST_THICKNESS, 0.5 * thickness)
 
 
 def least_stressed(failures: Sequence[Obstacle], failure: Obstacle) -> Obstacle:
@@ -63,11 +71,14 @@ def least_stressed(failures: Sequence[Obstacle], failure: Obstacle) -> Obstacle:
     standing = [
         each
         for each in failures
-        if each.why is Why.STRENGTH
-        and each.factor >= NEEDED
-        and (each.spacing, each.thickness) == (failure.spacing, failure.thickness)
+        if each.why is Why.STRENGTH and each.factor >= NEEDED and _alike(each, failure)
     ]
     return min(standing, key=lambda each: each.stress, default=failure)
+
+
+def _alike(one: Obstacle, other: Obstacle) -> bool:
+    """Whether both are of one spacing and thickness."""
+    return (one.spacing, one.thickness) == (other.spacing, other.thickness)
 
 
 def _thickness(outcome: tuple[Obstacle, FirstDesign | None]) -> float:

@@ -3,7 +3,7 @@ concrete."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
 from shellform.gridshell.layers import layers_of
@@ -31,6 +31,7 @@ _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge b
 _EASED = 5  # times that cables are eased, by less prestrain or thicker strands
 _STRONGER = 3  # times that strands are made stronger for rods that break
 _FALLS = (Why.STABILITY, Why.SCATTER)
+_HOPEFUL = 0.5  # of what is needed, that rods bear if it grows as their stiffness does
 _SPARED = 0.95  # of the stress before, at the most, for which cables are made slacker once more
 Stands = TypeVar("Stands")
 
@@ -130,7 +131,7 @@ def _after(net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle
     if least is None or (found not in tried and found > fallen):
         return found
     thinner = possible.index(thinner_rods(possible, possible[least], tried[least]))
-    if failure.why is Why.STRENGTH and thinner > fallen:
+    if failure.why is Why.STRENGTH and thinner > fallen and _may_stand(possible, tried, thinner):
         return thinner
     between = _between(possible, tried)
     return between[len(between) // 2] if between else at
@@ -148,13 +149,25 @@ def narrowed(possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]) -> bo
 
 
 def _between(possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]) -> list[int]:
-    """The sections stiffer than all that fell and less deep than what broke least; none where none broke."""
+    """The sections stiffer than all that fell and less deep than what broke least; none where none broke, nor
+    any that is sure to fall."""
     least = _least_broken(tried)
     if least is None:
         return []
     deep = bent_to(possible[least])
     stiffer = range(_stiffest_fallen(tried) + 1, least)
-    return [k for k in stiffer if k not in tried and bent_to(possible[k]) < deep]
+    untried = [k for k in stiffer if k not in tried and bent_to(possible[k]) < deep]
+    return [k for k in untried if _may_stand(possible, tried, k)]
+
+
+def _may_stand(possible: Sequence[RodChoice], tried: Mapping[int, Obstacle], at: int) -> bool:
+    """Whether a section may that is stiffer than all that fell: not where it is hardly stiffer than what bore
+    next to nothing."""
+    fallen = _stiffest_fallen(tried)
+    if fallen < 0:
+        return True
+    times = possible[at].bending / possible[fallen].bending
+    return times * tried[fallen].nearness(NEEDED) >= _HOPEFUL * NEEDED
 
 
 def _stiffest_fallen(tried: Mapping[int, Obstacle]) -> int:
@@ -220,6 +233,7 @@ def thinned(
     least: float,
     stands: Callable[[Placed, RodChoice, float, float], Stands | Obstacle],
     over: Callable[[], bool],
+    tried: Iterable[RodChoice] = (),
 ) -> tuple[Obstacle, Stands | None]:
     """What stands with the most concrete where the `failure` has shown that its rods don't bear theirs, if
     anything does, and what came nearest to the thickness asked for: the `nearest` until now, or rods that
@@ -229,11 +243,11 @@ def thinned(
     thinned for those that bear most, to about what the last trial says that they bear. Rods that would break
     without any concrete give way to less deep ones under as much as before. `stands` tries a net, rods, a
     spacing and a thickness, m; `least`, m, is the thinnest layer that is poured; nothing is tried once it is
-    `over`.
+    `over`, nor with as much concrete as the failure's those that were `tried` with it before.
     """
     assert failure.choice is not None
     rods, thickness = failure.choice, failure.thickness
-    seen, less_deep = {rods}, None
+    seen, less_deep = {rods, *tried}, None
     for _ in range(_THINNED):
         if failure.factor == 0.0 or over():  # without any concrete it doesn't stand
             break

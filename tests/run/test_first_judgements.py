@@ -323,13 +323,35 @@ def test_edge_beams_are_tried_from_the_lightest_of_their_stage_on(
     monkeypatch.setattr(first_design, "edge_choices", lambda choice: (0, 1, 2, 3))
     monkeypatch.setattr(first_design, "FirstDesign", str)
     monkeypatch.setattr(first_design, "may_sag", lambda surface, thickness: 2.0 * thickness)
-    search = SimpleNamespace(surface=None, lightest=lightest, layers=layers, with_edges=with_edges)
+    search = SimpleNamespace(
+        surface=None, lightest=lightest, layers=layers, with_edges=with_edges, _thickness=0.06
+    )
     placed = SimpleNamespace(net=SimpleNamespace(edges=lines))
     assert (
         _Search._stands(search, placed, Choice(sf.Rod.round(young=40e9, radius=0.01).section), 0.5, 0.05)
         is found[-1]
     )
     assert asked == tried
+
+
+def test_edges_that_sag_beside_rods_that_break_get_heavier_beams_only_where_concrete_is_thinned(monkeypatch):
+    """With all of it a round saddle of 24 m was led from tubes of 89 mm, which stand, to 140 mm, which
+    break."""
+    asked = []
+    monkeypatch.setattr(first_design, "edge_choices", lambda choice: (0, 1))
+    monkeypatch.setattr(first_design, "may_sag", lambda surface, thickness: 0.1)
+    search = SimpleNamespace(
+        surface=None,
+        lightest=0,
+        layers=(1,),
+        with_edges=lambda *of: asked.append(of[2]) or SAGS,
+        _thickness=0.05,
+    )
+    placed = SimpleNamespace(net=SimpleNamespace(edges=("line",)))
+    for thickness, tried in ((0.05, [0]), (0.04, [0, 1])):
+        asked.clear()
+        _Search._stands(search, placed, Choice(sf.Rod.round(young=40e9, radius=0.01).section), 0.5, thickness)
+        assert asked == tried
 
 
 @pytest.mark.parametrize(

@@ -79,6 +79,13 @@ def test_less_than_a_layer_is_refused_with_the_most_that_stands(thinner, comes_t
     assert len(thinner.asked) == 2
 
 
+def test_less_than_a_layer_will_do_where_it_is_the_last_way_out(thinner):
+    thinner.comes_to, thinner.allowance.thin_layers = {Why.STABILITY: 10.0}, True
+    assert thinner.design([FALLS]).thickness == 0.010
+    with pytest.raises(Said):
+        thinner.design([FALLS], wish=DesignWish(thickness=0.05))
+
+
 def test_where_nothing_stands_with_all_concrete_it_is_thinned_once(thinner):
     with pytest.raises(Said):
         thinner.design([FALLS])

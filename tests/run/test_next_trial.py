@@ -139,6 +139,26 @@ def test_after_a_shell_that_lies_on_the_ground_come_stiffer_rods_whatever_it_is_
     assert next_trial.after("net", SOME, tried, last=last) == 2, "one is likely to bear it"
 
 
+@pytest.mark.parametrize(
+    ("bore", "stress", "then"),
+    [
+        (0.5, 1.16, 4),  # less deep by what its stress asks for
+        (0.28, 1.16, 4),  # 2.73 times as stiff may bear half of what is needed
+        (0.27, 1.16, 5),  # 4.16 times
+        (0.18, 1.16, 6),  # none between them does: the end
+        (0.0, 1.01, 6),
+    ],
+)
+def test_between_them_no_section_is_tried_that_is_sure_to_fall_too(monkeypatch, bore, stress, then):
+    """On a hall of 36 m with open arches two layers of 22 mm fell without any load and of 30 mm broke, and
+    those of 25 and 28 mm were tried."""
+    monkeypatch.setattr(next_trial, "next_section", lambda *_: 6)
+    fell, broke = failed(Why.STABILITY, bore), failed(Why.STRENGTH, 1.5, stress)
+    tried = {2: fell, 6: broke}
+    assert next_trial.after("net", ROW, tried) == then
+    assert next_trial.narrowed(ROW, tried) == (then != 6)
+
+
 @pytest.mark.parametrize("tried", [{2: Why.STABILITY}, {6: Why.STRENGTH}, {2: Why.EDGES, 6: Why.STRENGTH}])
 def test_sections_are_narrowed_down_only_between_one_that_fell_and_one_that_broke(tried):
     assert not next_trial.narrowed(ROW, {k: failed(why) for k, why in tried.items()})
