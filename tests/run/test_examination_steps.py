@@ -456,6 +456,7 @@ def test_designs_are_drawn_in_full_from_the_last_on_until_one_holds(
 
     monkeypatch.setattr(examination, "read_run", lambda folder: run)
     monkeypatch.setattr(examination, "_of_run", lambda run, name: examined(name))
+    monkeypatch.setattr(Examined, "key", lambda self, seed: self.name)
     monkeypatch.setattr(examination, "side_by_side", lambda call, every: [call(each) for each in every])
     monkeypatch.setattr(
         examination, "_critical", lambda case, each, record: replace(record, critical_factor_kept=True)
@@ -522,6 +523,7 @@ def test_of_a_design_that_falls_behind_once_it_is_drawn_in_full_neither_verdict_
 
     monkeypatch.setattr(examination, "read_run", lambda folder: run)
     monkeypatch.setattr(examination, "_of_run", lambda run, name: examined(name))
+    monkeypatch.setattr(Examined, "key", lambda self, seed: self.name)
     monkeypatch.setattr(examination, "side_by_side", lambda call, every: [call(each) for each in every])
     monkeypatch.setattr(examination, "_critical", lambda case, each, record: record)
     monkeypatch.setattr(examination, "_stand", stand)

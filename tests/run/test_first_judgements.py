@@ -194,6 +194,17 @@ def test_where_rods_would_break_without_any_concrete_less_deep_ones_are_tried_wi
     assert tried == [(deep, 25.0), (thin, 50.0), (thin, 38.0)]
 
 
+def test_rods_that_were_tried_with_as_much_concrete_are_not_tried_again(monkeypatch):
+    deep, thin = (Choice(sf.Rod.round(young=40e9, radius=radius).section) for radius in (0.02, 0.015))
+    net, asked = SimpleNamespace(net=None), []
+    breaks = Obstacle(Why.STRENGTH, 0.5, 0.05, 1.5, deep, net, stress=1.2)
+    stand_in_sizes(monkeypatch, 0, 0.8)  # thinner ones would come next
+    for tried, first in (((), (thin, 0.05)), ((thin,), (deep, 0.04))):
+        stands = lambda placed, rods, spacing, thickness: asked.append((rods, thickness)) or STANDS  # noqa: E731
+        next_trial.thinned(breaks, breaks, [thin, deep], 0.01, stands, lambda: False, tried)
+        assert asked.pop() == first
+
+
 def test_no_less_is_poured_than_three_tenths_of_a_layer_and_nothing_is_tried_once_the_work_is_spent():
     choice = Choice(sf.Rod.round(young=40e9, radius=0.01).section)
     failure = Obstacle(Why.STABILITY, 0.5, 0.05, 0.1, choice, SimpleNamespace(net=None))

@@ -24,9 +24,10 @@ class Said(Exception):
 @pytest.fixture
 def thinner(monkeypatch):
     """Concrete thinned, in mm, for what falls and for what breaks; what is left of the work is kept."""
-    told = SimpleNamespace(comes_to={}, asked=[], allowance=Allowance(9000).part(2 / 3))
+    told = SimpleNamespace(comes_to={}, asked=[], tried=[], allowance=Allowance(9000).part(2 / 3))
 
-    def thinned(failure, nearest, possible, least, stands, over):
+    def thinned(failure, nearest, possible, least, stands, over, tried):
+        told.tried = tried
         told.asked.append((failure, told.allowance.left, over()))
         told.allowance.spend(1000)
         found = told.comes_to.get(failure.why)
@@ -61,6 +62,18 @@ def test_where_too_little_is_left_it_is_thinned_for_those_that_stand_with_the_le
     falls_too = replace(BREAKS, factor=1.4, stress=1.1)
     assert thinner.design([WORSE, elsewhere, falls_too, FALLS, BREAKS]).thickness == 0.025
     assert [each for each, *_ in thinner.asked] == [FALLS, BREAKS]
+
+
+def test_what_was_tried_with_as_much_concrete_is_said_so_that_it_is_not_tried_again(thinner):
+    """A round saddle's tubes of 140 mm, which had broken, were tried again with all its concrete."""
+    thinner.comes_to = {Why.STABILITY: 20.0}
+    others = [SimpleNamespace(section=CHOICE.section) for _ in range(3)]
+    elsewhere, thinned = (
+        replace(BREAKS, spacing=1.0, choice=others[0]),
+        replace(BREAKS, thickness=0.03, choice=others[1]),
+    )
+    thinner.design([FALLS, elsewhere, thinned, replace(BREAKS, choice=others[2])])
+    assert thinner.tried == [CHOICE, others[2]]
 
 
 @pytest.mark.parametrize(
