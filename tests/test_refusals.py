@@ -36,7 +36,6 @@ KINDS = {"InputError", "Damaged", "NotConverged", "NoNet"}
 # remedy is known to work where no surface near a crumpled one is smooth.
 EXCUSED = {
     "cli/analyse.py": 1,
-    "run/first_design.py": 1,
     "run/first_refusal.py": 1,
     "surface/readers/foreign.py": 2,
     "surface/shape/fairing.py": 2,

@@ -27,8 +27,8 @@ class Reason(Enum):
 
 
 class NoNet(InputError):
-    """A surface that takes no net with the settings at hand, and the `reason`; how many `factorisations` a
-    pull had taken that gave a net which then was refused."""
+    """A surface that takes no net with the settings at hand, and the `reason`; how many `factorisations`
+    pulls had taken, such as gave a net which then was refused."""
 
     def __init__(
         self, reason: Reason, what: str, *, where: str = "", value: object = None, remedy: str = ""

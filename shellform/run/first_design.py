@@ -160,10 +160,9 @@ class _Search:
 
     def that_holds(self, *, finer: bool) -> FirstDesign:
         """The first that stands."""
-        spacing = self._first_spacing()
+        spacing, thickness = self._first_spacing(), self._thickness
         if finer and self.surface.area <= MOST_CROSSINGS * practical(_FINER * spacing) ** 2:
             spacing = self._finer(spacing)
-        thickness = self._thickness
         for number in range(_SPACINGS):
             if number:
                 if self.wish.spacing is not None or self._vain(spacing, practical(_FINER * spacing)):
@@ -194,10 +193,8 @@ class _Search:
         return spacing
 
     def _finer(self, spacing: float) -> float:
-        """The next finer spacing. Raises InputError for one that is too fine to solve."""
+        """The next finer spacing."""
         finer = practical(_FINER * spacing)
-        if self.surface.area > MOST_CROSSINGS * finer**2:
-            raise InputError(f"left untried, since {finer:g} m takes more crossings than a first design has")
         self.reasons[finer] = f"finer than {spacing:g} m, with which none stands"
         return finer
 

@@ -134,6 +134,7 @@ def least_bent_net(
     spent. Raises NoNet or Stalled."""
     limit = _PULL if allowance.thorough else _BRIEF
     settings = NetSettings(spacing=spacing, gap=gap, elements=ELEMENTS, tuning=NetTuning(limit=limit))
+    crossings = surface.area / spacing**2
 
     def attempt(place: tuple[float, tuple[float, float]]) -> Placed | NoNet | Stalled:
         angle, offset = place
@@ -145,7 +146,7 @@ def least_bent_net(
         return Placed(net, angle, offset)
 
     def counted(found: Placed | NoNet | Stalled, angle: float) -> Placed | NoNet | Stalled:
-        crossings, where = surface.area / spacing**2, f"net at {angle:g}°, {spacing:g} m"
+        where = f"net at {angle:g}°, {spacing:g} m"
         if isinstance(found, Placed):
             allowance.spend(crossings)
             tell(f"{where}: rods bend to a radius of {bends_to(found.net):.3g} m")
@@ -177,7 +178,6 @@ def least_bent_net(
     left = _worth(surface, spacing) - sum(_taken(each) for each in pulled if not isinstance(each, Placed))
     if allowance.over or not allowance.thorough or left <= 0:
         raise failed
-    crossings = surface.area / spacing**2
     try:
         net, given = climbed_net(
             surface,

@@ -36,9 +36,7 @@ _APART = 1.3  # from one to the next, at the least
 _FURTHER = 1.7  # times the largest radius, where it helps nothing
 _TRIED = 0.8  # of the work that is left: on rounded surfaces, on these again on walls, and with less concrete
 _WALLED = 0.4  # on walls, with which large nets are tried once
-_NEARLY = (
-    0.2  # of the load needed, that a shell has to bear which is tried thoroughly, with less concrete too
-)
+_NEARLY = 0.2  # of the load needed, that a shell has to bear which is tried thoroughly
 _WALLS = "--edges wall"
 _THICKNESS = "--thickness"
 _TAKEN = "--way-out"
@@ -181,7 +179,7 @@ class _Rounded:
         self.options = ""  # of the command, that stand for it
         self.too_late = False  # whether no work was left for even the first
         self.best = _Brief(0.0, wish, 0.0)
-        self._finer = False
+        self._thorough = False
         self._share = 0.0
         self._begun = self._covered = False
         self._say = say
@@ -197,7 +195,7 @@ class _Rounded:
 
     def go_on(self) -> None:
         """With finer spacings and thinner concrete."""
-        self._finer, self._share = True, self.best.share
+        self._thorough, self._share = True, self.best.share
         self._brief = self._walled = self._whole.rest(1.0, thin_layers=True)
 
     def in_turn(self, shares: Sequence[float]) -> Iterator[float]:
@@ -212,8 +210,8 @@ class _Rounded:
         self._begun = self._begun or not self.too_late
         plinths = plinths_for(surface)  # which whoever follows gets too
         surface = surface if plinths is None else plinths.surface
-        wish = self.best.wish if self._finer else self.wish
-        how = "rounded, finer" if self._finer else "rounded"
+        wish = self.best.wish if self._thorough else self.wish
+        how = "rounded, thoroughly" if self._thorough else "rounded"
         try:
             self.design = self._tried(how, surface, wish, self._brief)
         except (InputError, NotConverged) as error:
@@ -229,7 +227,7 @@ class _Rounded:
         """The design that stands with a wish; where none does, the trial may be the best."""
         allowance.bore, allowance.angle = 0.0, wish.angle
         try:
-            design = _trial(how, surface, wish, allowance, self._say, finer=self._finer)
+            design = _trial(how, surface, wish, allowance, self._say, finer=self._thorough)
         except (InputError, NotConverged):
             if allowance.bore > self.best.bore or self.best.bore == 0.0:
                 self.best = _Brief(self._share, replace(wish, angle=allowance.angle), allowance.bore)
