@@ -68,10 +68,10 @@ def case_problem(
     total = sum(share for share, _ in shares)
     others = [name for name in loads if name not in ("none", "design")]
     constraints: list[Constraint] = [AtMost(case.cable.force_max, CableForces("design"))]
-    for name in others:
-        constraints.append(AtMost(entry.misfit_rms_additional, RmsMisfit(name)))
-        if entry.method != "paper":  # whose constraint (5) is on the design load
-            constraints.append(AtMost(case.cable.force_max, LargestCableForce(name, case.cable.force_max)))
+    constraints += [AtMost(entry.misfit_rms_additional, RmsMisfit(name)) for name in others]
+    if entry.method != "paper":  # whose constraint (5) is on the design load; cables break under any
+        most = case.cable.force_max
+        constraints += [AtMost(most, LargestCableForce(name, most)) for name in loads if name != "design"]
     constraints += _engineers(case, shell, loads)
     if case.robust is not None:
         tolerances, added = case_tolerances(case, shell), case.robust.deviations

@@ -193,7 +193,7 @@ class CableEntry(Entry):
         0.99, gt=0.0, lt=1.0, description="initial rest length over length in the target"
     )
     force_max: PositiveFloat = Field(
-        description="largest allowed tension, N (constraint 5); as much as the stiffness limits nothing"
+        description="largest allowed tension before any load and under each, N (constraint 5; by the paper's method under the design load alone); as much as the stiffness limits nothing"
     )
     edge_cells: bool | None = Field(
         None,

@@ -141,11 +141,10 @@ def tell_as_built(summary: Summary) -> None:
                 print(f"{name:>10}  {load}: {', '.join(parts)}")
     if summary.verdict is not None:
         name = summary.verdict.design
-        limit = None if summary.optimisation is None else summary.optimisation.cable_force_limit
-        pulled = before_load_words(summary.designs, name, limit)
+        slack = before_load_words(summary.designs, name)
         ways = summary.designs[name].ways_up if name in summary.designs else None
         raised = raising_words(ways) if ways else ""
-        for note in (*shape_notes(summary, name), pulled, raised):
+        for note in (*shape_notes(summary, name), slack, raised):
             if note:
                 print(f"{note}.")
     found = summary.failure

@@ -152,9 +152,9 @@ class ConnectorTurn(Term):
 
 @dataclass(frozen=True)
 class LargestCableForce(Term):
-    """The largest cable tension, N: constraint (5) for load cases beside the design load, in one value;
-    `scale`, N, is the size of tensions that matter, such as their limit. A cable at less than nine tenths of
-    the largest has no weight."""
+    """The largest cable tension, N: constraint (5) before any load and for loads beside the design load, in
+    one value; `scale`, N, is the size of tensions that matter, such as their limit. A cable at less than nine
+    tenths of the largest has no weight."""
 
     name = "cable_force"
     load: str

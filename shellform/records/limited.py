@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from shellform.quantities import newtons
 from shellform.records.as_built import AsBuilt
-from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, on_worse_mesh, quantity
+from shellform.records.check import SLACK, UNKNOWN, Cell, Check, below, on_worse_mesh, quantity
 from shellform.records.remedies import RodSizes, RodsOf, allow, allow_less, rounded_up
 from shellform.records.summary import DesignRecord, LoadRecord
 from shellform.records.words import load_title
@@ -137,7 +137,7 @@ def limited(rows: Mapping[str, DesignRecord], rods: Mapping[str, RodsOf], bounds
         ),
     ]
     pulled = _Limit(
-        "Largest cable force under the design load and those beyond it (5)",
+        "Largest cable force before any load and under each (5)",
         "cable.force_max",
         bounds.force,
         _pull,
@@ -146,22 +146,11 @@ def limited(rows: Mapping[str, DesignRecord], rods: Mapping[str, RodsOf], bounds
     designs = list(rods)
     found = [
         _at_most(pulled, bounds.force, rows, rods),
-        *_pulled_before(rows, designs, bounds.force),
         *(_at_most(each, each.most, rows, rods) for each in limits if each.most is not None),
     ]
     if bounds.slack is not None:
         found += [_taut(rows, designs, load, bounds.slack) for load in bounds.slack_loads]
     return found
-
-
-def _pulled_before(rows: Mapping[str, DesignRecord], designs: Sequence[str], force: float) -> list[Check]:
-    """The largest cable force before any load, which is told and not asked for, where it is known; `force`,
-    N: the limit under load."""
-    pulls = {name: row.loads["none"].cable_force_max for name, row in rows.items() if "none" in row.loads}
-    told = {name: Cell(newtons(pull), None, False) for name, pull in pulls.items() if pull is not None}
-    cells = {name: told.get(name, UNASKED) for name in designs}
-    limit = f"told; the limit, {newtons(force)}, counts under load"
-    return [Check("Largest cable force before any load", limit, cells)] if told else []
 
 
 def _at_most(
@@ -191,9 +180,8 @@ def _under(load: str, row: DesignRecord, value: Callable[[LoadRecord], float | N
 
 
 def _pull(row: DesignRecord) -> _Found | None:
-    """Of the cables, N, under every load but none; the design's own where that isn't known."""
-    loaded = [each for load, each in row.loads.items() if load != "none"]
-    found = _worst(loaded, lambda load: load.cable_force_max)
+    """Of the cables, N, before any load and under each; the design's own where that isn't known."""
+    found = _worst(row.loads.values(), lambda load: load.cable_force_max)
     return found if found is not None and found.value else _Found(row.cable_force_max, None)
 
 

@@ -37,7 +37,7 @@ class OptimisationRecord:
     - `not_polished`: why it wasn't.
     - `cables_max`, `symmetric`: what came of these wishes.
     - `deviation_wished`, m: how far a node may be off by what is saved (None: not said).
-    - `cable_force_limit`, N: what a cable may pull under loads, not before any (5).
+    - `cable_force_limit`, N: what a cable may pull (5).
     """
 
     objective_start: float

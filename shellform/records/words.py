@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from shellform.quantities import newtons, number
 from shellform.records.failures import RareRecord
 from shellform.records.raising import SCAFFOLD, WayUpRecord, easiest
-from shellform.records.summary import BuiltShapeRecord, DesignRecord, LoadRecord, StandingRecord, Summary
+from shellform.records.summary import BuiltShapeRecord, DesignRecord, StandingRecord, Summary
 
 _SPENT = 1.25  # times the initial design's deviation as built, from which on it is worth a word
 _LISTED = 8  # names, where there are more of them
@@ -143,20 +143,13 @@ def goes_slack_words(cables: Sequence[str]) -> str:
     return f"{', '.join(cables)} {'goes' if len(cables) == 1 else 'go'} slack" if cables else ""
 
 
-def before_load_words(designs: Mapping[str, DesignRecord], name: str, limit: float | None) -> str:
-    """How much a cable of the design pulls before any load, where that is more than the `limit`, N, which
-    counts under load (None: not known), and which cables hang slack then; "" where there is neither."""
+def before_load_words(designs: Mapping[str, DesignRecord], name: str) -> str:
+    """Which cables of the design hang slack before any load; "" where none does."""
     row = designs[name].loads.get("none") if name in designs else None
-    if row is None:
+    if row is None or not row.slack:
         return ""
-    found, pull = [], row.cable_force_max
-    if pull is not None and limit is not None and exceeds(pull, limit):
-        found.append(
-            f"a cable pulls {newtons(pull)}, more than the {newtons(limit)} of cable.force_max, which counts under load"
-        )
-    if row.slack:
-        found.append(f"{listed(row.slack)} {'hangs' if len(row.slack) == 1 else 'hang'} slack")
-    return f"Before any load {', and '.join(found)}: schedules/cables.csv" if found else ""
+    hang = "hangs" if len(row.slack) == 1 else "hang"
+    return f"Before any load {listed(row.slack)} {hang} slack: schedules/cables.csv"
 
 
 def way_up_words(way: WayUpRecord) -> str:
@@ -184,20 +177,6 @@ def raising_words(ways: Sequence[WayUpRecord]) -> str:
         return f"The grid goes up by {way_up_words(best)}; the rods' strength, of which they bear some, isn't known"
     others = "".join(f", {borne_words(each)}" for each in ways if each is not best)
     return f"On the way up rods bear up to {borne_words(best, ' of their strength')}{others}"
-
-
-def above_words(row: LoadRecord | None, limit: float | None) -> str:
-    """How much a cable pulls at most before any load, and that it is more than the `limit`, N, under load
-    where it is; "" where it isn't known."""
-    pull = None if row is None else row.cable_force_max
-    if pull is None:
-        return ""
-    more = (
-        f", more than the {newtons(limit)} that it may pull under load"
-        if limit is not None and exceeds(pull, limit)
-        else ""
-    )
-    return f"{newtons(pull)} at most before any load{more}"
 
 
 def exceeds(pull: float, limit: float) -> bool:

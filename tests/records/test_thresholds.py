@@ -18,7 +18,6 @@ from shellform.records.summary import BuiltShapeRecord, StandingRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, headline, to_build, verdict
 from shellform.records.words import (
-    above_words,
     before_load_words,
     built_shape_words,
     critical_words,
@@ -423,19 +422,16 @@ def test_more_than_the_strength_is_nothing_to_allow(shell, designs, most, bendin
     assert made["Rods' stress with axial force under any load"].remedy == remedy
 
 
-def test_the_largest_cable_force_is_that_of_the_worst_load_but_for_none(shell, designs):
-    name = "Largest cable force under the design load and those beyond it (5)"
-    loads = {
-        each: load(each, cable_force_max=force)
-        for each, force in (("none", 30.0), ("design", 4.0), ("additional", 6.0))
-    }
-    made = summary(designs).with_design("polished", design(loads=loads, cable_force_max=30.0))
-    cell = {c.name: c for c in checks({"polished": shell}, designs, made, BOUNDS)}[name].cells["polished"]
-    assert cell.found == "6 N"
-    before = {c.name: c for c in checks({"polished": shell}, designs, made, BOUNDS)}[
-        "Largest cable force before any load"
-    ].cells["polished"]
-    assert (before.found, before.holds, before.asked) == ("30 N", None, False), "told, not limited"
+def test_the_largest_cable_force_is_that_before_any_load_or_of_the_worst(shell, designs):
+    name = "Largest cable force before any load and under each (5)"
+    for forces, most in (((30.0, 4.0, 6.0), "30 N"), ((3.0, 4.0, 6.0), "6 N")):
+        loads = {
+            each: load(each, cable_force_max=force)
+            for each, force in zip(("none", "design", "additional"), forces, strict=True)
+        }
+        made = summary(designs).with_design("polished", design(loads=loads, cable_force_max=4.0))
+        cell = {c.name: c for c in checks({"polished": shell}, designs, made, BOUNDS)}[name].cells["polished"]
+        assert cell.found == most
     assert found(shell, designs)[name].found == "7 N", "the design's own where no load's is known"
 
 
@@ -605,29 +601,18 @@ def test_a_shape_farther_off_than_was_wished_for_is_told_with_what_would_require
     assert far_off_words(rows, "optimised", 0.032) == "", "a design that isn't there"
 
 
-def test_a_cable_that_pulls_most_before_any_load_is_told_beside_the_limit_under_load():
-    def rows(pull=None, slack=()):
-        return {"polished": design("none", cable_force_max=pull, slack=slack)}
+def test_cables_that_hang_slack_before_any_load_are_named():
+    def rows(slack=()):
+        return {"polished": design("none", slack=slack)}
 
-    told = before_load_words(rows(20.79, ("C5", "C7")), "polished", 20.0)
-    assert told == (
-        "Before any load a cable pulls 20.8 N, more than the 20 N of cable.force_max, which counts under load, and C5, C7 hang "
-        "slack: schedules/cables.csv"
+    assert before_load_words(rows(("C5", "C7")), "polished") == (
+        "Before any load C5, C7 hang slack: schedules/cables.csv"
     )
-    assert before_load_words(rows(19.0, ("C5",)), "polished", 20.0) == (
+    assert before_load_words(rows(("C5",)), "polished") == (
         "Before any load C5 hangs slack: schedules/cables.csv"
     )
-    for pull, limit in ((20.04, 20.0), (19.0, 20.0), (None, 20.0), (30.0, None)):
-        assert before_load_words(rows(pull), "polished", limit) == "", (
-            "as much by what is told of both, or unknown"
-        )
-    assert before_load_words(rows(30.0), "optimised", 20.0) == "", "a design that isn't there"
-    row = rows(20.79)["polished"].loads["none"]
-    assert above_words(row, 20.0) == (
-        "20.8 N at most before any load, more than the 20 N that it may pull under load"
-    )
-    assert above_words(row, 21.0) == above_words(row, None) == "20.8 N at most before any load"
-    assert above_words(None, 20.0) == above_words(replace(row, cable_force_max=None), 20.0) == ""
+    assert before_load_words(rows(), "polished") == ""
+    assert before_load_words(rows(("C5",)), "optimised") == "", "a design that isn't there"
 
 
 def test_words_of_loads_paths_and_structures_keep_their_numbers():

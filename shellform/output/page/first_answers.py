@@ -21,7 +21,6 @@ from shellform.records.check import SLACK, Cell
 from shellform.records.raising import WayUpRecord, easiest
 from shellform.records.summary import DocumentsRecord, LoadRecord, Summary
 from shellform.records.words import (
-    above_words,
     confidence_words,
     driven_words,
     listed,
@@ -65,12 +64,10 @@ def answers(
     *,
     as_built: Cell | None = None,
     next_size: str = "",
-    force_max: float | None = None,
 ) -> list[Answer]:
     """How far off is the shell, how many cables, which rods, is it safe beyond the load, what to buy: for the
     design to build, whose check `as_built` says how many drawn structures stand under the additional load;
-    `next_size` is the size of the catalogue that its rods would be rounded to; `force_max`, N: what cables
-    may pull under load."""
+    `next_size` is the size of the catalogue that its rods would be rounded to."""
     own = summary.designs.get(name)
     loads = {} if own is None else own.loads
     main, more, before = (loads.get(load) for load in ("design", "additional", "none"))
@@ -82,7 +79,7 @@ def answers(
             "How many cables?",
             f"{len(cables.ends)} of {len(shell.cable_ends)}",
             f"{newtons(float(pull.max(initial=0.0)))} at most in one, {newtons(float(pull.sum()))} in all, "
-            f"under the design load{_before(before, force_max)}{_slack(main, before)}",
+            f"under the design load{_before(before)}{_slack(main, before)}",
         )
     )
     section = shell.rod.resized(design.radius).section
@@ -142,10 +139,10 @@ def _beams(shell: Gridshell) -> str:
     return f", {count} of {length} m in all{weight}, {of or label(shell.edge.section)}"
 
 
-def _before(before: LoadRecord | None, force_max: float | None) -> str:
-    """How much a cable pulls at most before any load, beside what it may pull."""
-    told = above_words(before, force_max)
-    return f"; {told}" if told else ""
+def _before(before: LoadRecord | None) -> str:
+    """How much a cable pulls at most before any load."""
+    pull = None if before is None else before.cable_force_max
+    return "" if pull is None else f"; {newtons(pull)} at most before any load"
 
 
 def _slack(main: LoadRecord | None, before: LoadRecord | None) -> str:

@@ -90,7 +90,6 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
             summary,
             as_built=_as_built(run, "additional"),
             next_size=run.next_size,
-            force_max=run.force_max,
         ),
         "failure": summary.failure,
         "failure_driver": "" if summary.failure is None else words.cause_title(summary.failure.driver),

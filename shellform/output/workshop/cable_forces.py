@@ -1,5 +1,5 @@
-"""How much cables pull at each stage, in words, beside what they may pull: constraint (5) limits them under
-load alone, and some pull most before the pour.
+"""How much cables pull at each stage, in words, beside what they may pull (5): some most before the
+pour.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from shellform.records.words import exceeds, listed
 
 
 def force_notes(pulls: Mapping[str, Reals], before: str, limit: float | None) -> tuple[str, ...]:
-    """Of the tensions (c,), N, by stage, that `before` any load among them, and their `limit`, N, under load
+    """Of the tensions (c,), N, by stage, that `before` any load among them, and their `limit`, N
     (None: not known), a sentence each: the largest, what is above the limit, what hangs slack before."""
     if not len(pulls[before]):
         return ()
@@ -22,13 +22,15 @@ def force_notes(pulls: Mapping[str, Reals], before: str, limit: float | None) ->
     found = ", ".join(f"{name} {newtons(float(pulls[name][k]))} (C{k})" for name, k in most.items())
     told = [f"Largest force: {found}."]
     if limit is not None:
-        above = [k for k, pull in enumerate(pulls[before].tolist()) if exceeds(pull, limit)]
-        told[0] += f" The limit, {newtons(limit)}, counts under load alone (cable.force_max)."
+        told[0] += f" The limit is {newtons(limit)} (cable.force_max)."
+        above = [
+            (name, k)
+            for name, pull in pulls.items()
+            for k, n in enumerate(pull.tolist())
+            if exceeds(n, limit)
+        ]
         if above:
-            told.append(
-                f"Before any load more than that: {listed([f'C{k}' for k in above])}. Choose cables, ends and turnbuckles "
-                "for it."
-            )
+            told.append(f"More than that: {listed([f'C{k} ({name})' for name, k in above])}.")
     slack = np.flatnonzero(pulls[before] <= 0.0).tolist()
     if slack:
         told.append(f"Slack before any load: {listed([f'C{k}' for k in slack])}.")

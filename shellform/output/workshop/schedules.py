@@ -73,7 +73,7 @@ class Built(Record):
     the turnbuckles' range, by which cables are let out from the lengths that they are cut to (None: each is
     cut for itself). `origin` (3,), m: where coordinates count from in those of a survey (None: the file's).
     `loads` (n, 6), N, of the states: what stands on a support goes straight into it (left out: nothing).
-    `force_limit`, N: what cables may pull under load (None: not known)."""
+    `force_limit`, N: what cables may pull (None: not known)."""
 
     shell: Gridshell
     design: Design
