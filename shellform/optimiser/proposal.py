@@ -79,6 +79,8 @@ def propose(task: Task) -> tuple[Reals, float]:
     slope = _slope(task)
     values = model.point.constraints + task.excess
     scaled_slope, scaled_rows = slope * width, model.constraints_by_y * width
+    asked_of = _within_reach(task, values, scaled_rows)
+    values, scaled_rows = values[asked_of], scaled_rows[asked_of]
     scaled_curvature = _curvature(model, width)
     low, high = (lower - model.origin) / width, (upper - model.origin) / width
 
@@ -95,7 +97,7 @@ def propose(task: Task) -> tuple[Reals, float]:
         # an aim is met as far as that is worth its price, even if it could be met
         u = None if _at_their_price(task, values) else minimise_quadratic(*asked)
         if u is None:
-            u = _as_far_as_can_be(task, *asked)
+            u = _as_far_as_can_be(task, len(values), *asked)
         elif not task.guards and len(limits) <= _FEW:
             u = _from_there(evaluate, np.clip(u, low, high), low, high, task.solver.model_evaluations)
         return np.clip(np.zeros(len(width)), low, high) if u is None else u
@@ -108,6 +110,17 @@ def propose(task: Task) -> tuple[Reals, float]:
     if task.groups is None:
         y[:count][y[:count] < _NONE * task.tension] = 0.0
     return y, evaluate(u)[0]
+
+
+def _within_reach(task: Task, values: Reals, rows: Reals) -> Flags:
+    """Which of the constraints (k,) a step is asked for, of their `values` and `rows` (k, y) in windows: all
+    but limits before any load to which no step within the window leads."""
+    problem = task.model.evaluator.problem
+    asked = np.ones(len(values), dtype=bool)
+    for part, own in zip(problem.constraints, problem.places(), strict=True):
+        if part.term.load in problem.loads and not problem.loads[part.term.load].any():
+            asked[own] = values[own] + np.abs(rows[own]).sum(axis=1) > 0.0
+    return asked
 
 
 def _from_there(
@@ -136,13 +149,21 @@ def _from_there(
 
 
 def _as_far_as_can_be(
-    task: Task, curvature: Reals | LowRank, slope: Reals, rows: Reals, values: Reals, low: Reals, high: Reals
+    task: Task,
+    count: int,
+    curvature: Reals | LowRank,
+    slope: Reals,
+    rows: Reals,
+    values: Reals,
+    low: Reals,
+    high: Reals,
 ) -> Reals | None:
-    """The model's optimum in windows (y,) where more is asked for than a step can give. Of what limits are
+    """The model's optimum in windows (y,) where more is asked for than a step can give; `count` of the values
+    are the problem's, the others guards'. Of what limits are
     broken by a share t remains, of what aims miss and of what guards ask for others, 0 <= t <= 1, each at its
     price."""
-    size, count = len(slope), len(task.model.point.constraints)
-    limits, price = count - task.aims, task.solver.penalty
+    size, price = len(slope), task.solver.penalty
+    limits = count - task.aims
     kinds = [(slice(limits), price), (slice(count, None), price)]
     if task.aims:
         kinds.append((slice(limits, count), task.solver.aim * price))

@@ -163,6 +163,7 @@ def model_of(**changes):
         "upper": np.array([9.0, 6.0, 0.2]),
         "step": np.array([0.04]),
         "answers": answers,
+        "evaluator": SimpleNamespace(problem=SimpleNamespace(constraints=[], loads={}, places=list)),
     }
     return SimpleNamespace(**{**given, **changes})
 
@@ -362,6 +363,26 @@ def test_a_step_is_bounded_by_its_window_in_tensions_and_by_its_share_of_other_s
     grouped = task_of(model=model, groups=np.array([0, 1]))
     monkeypatch.setattr(proposal, "_equal_steps", lambda *_: np.array([0.0, -0.999, 0.0]))
     assert propose(grouped)[0][1] == pytest.approx(0.0005), "of cables alike none goes alone"
+
+
+@pytest.mark.parametrize(("near", "asked"), [(-0.9, [1]), (-0.8, [0, 1])])
+def test_limits_before_any_load_that_no_step_within_the_window_reaches_are_left_out(monkeypatch, near, asked):
+    """A window of 0.5 N and of a quarter of the radius' step changes each by 0.5 + 0.3 + 0.05."""
+    seen = []
+    monkeypatch.setattr(proposal, "minimise_quadratic", lambda *given: seen.append(given) or np.zeros(3))
+    monkeypatch.setattr(proposal, "_from_there", lambda evaluate, u, *_: u)
+    monkeypatch.setattr(proposal, "_slope", lambda task: np.zeros(3))
+    monkeypatch.setattr(proposal, "_curvature", lambda model, width: np.eye(3))
+    loads = {"none": np.zeros((2, 6)), "wet": np.ones((2, 6))}
+    limits = [SimpleNamespace(term=SimpleNamespace(load=name)) for name in loads]
+    problem = SimpleNamespace(constraints=limits, loads=loads, places=lambda: [slice(0, 1), slice(1, 2)])
+    model = model_of(
+        point=SimpleNamespace(constraints=np.array([near, near])),
+        constraints_by_y=np.array([[1.0, -0.6, 5.0], [1.0, -0.6, 5.0]]),
+        evaluator=SimpleNamespace(problem=problem),
+    )
+    propose(task_of(model=model, excess=np.zeros(2)))
+    assert len(seen[0][3]) == len(asked), "under a load each stays"
 
 
 def test_cables_alike_change_their_lengths_by_the_same():

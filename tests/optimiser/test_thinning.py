@@ -46,15 +46,12 @@ def told(stands):
 
 
 def test_a_step_that_is_asked_for_more_than_it_can_give_gives_all_that_it_can():
-    task = SimpleNamespace(
-        solver=sf.SequentialConvex(),
-        model=SimpleNamespace(point=SimpleNamespace(constraints=np.ones(1))),
-        aims=0,
-    )
+    task = SimpleNamespace(solver=sf.SequentialConvex(), aims=0)
     # u in [-1, 1] falls by the objective; the constraint 1 - u / 2 <= 0 can come down to a half, and the
     # guard of the other variable, 0.3 - v <= 0, to nothing
     u = _as_far_as_can_be(
         task,
+        1,
         np.eye(2),
         np.array([1.0, 1.0]),
         np.array([[-0.5, 0.0], [0.0, -1.0]]),
