@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from shellform.optimiser.going_back import within_limits
 from shellform.optimiser.optimum import worse
 from shellform.optimiser.proposal import propose
@@ -21,12 +23,13 @@ from shellform.optimiser.search_state import (
     noted,
     violation,
 )
-from shellform.optimiser.trials import accepted, attempt, reach, staged, task
+from shellform.optimiser.trials import accepted, attempt, attempt_towards, reach, staged, task
 
 _TINY = -1e-300  # a predicted change that isn't one
 # of the objective, gained since cables were last let go slack, for which they are let again where thinning is
 # to end with what stands
 _WORTH_LETTING_GO = 0.05
+_BACK = 1 / 16, 1 / 4  # of the way to a design that keeps every limit, by which one goes back that breaks one
 
 
 def climb(search: Search, it: Iterate) -> Iterate:
@@ -61,7 +64,24 @@ def descend(search: Search, it: Iterate, *, least: int = 0) -> Iterate:
     """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none
     may; and so on as long as both together improve the objective. A design that keeps every limit leaves the
     `least` of the evaluations to what comes next, and is where it ends, where there is one."""
-    return within_limits(search, _rounds(search, it, least))
+    return within_limits(search, _brought_within(search, _rounds(search, it, least)))
+
+
+def _brought_within(search: Search, it: Iterate) -> Iterate:
+    """Where rounds have ended with a design that breaks a limit: a little back along the straight way to the
+    last accepted one that keeps all of them, in one or two evaluations more, rather than all the way. The
+    same iterate where that leads to none that keeps them and is better than that one."""
+    if violation(search, it.point) <= 0.0:
+        return it
+    kept = next((each for each in reversed(it.accepted) if each.violation <= 0.0), None)
+    if kept is None or not np.array_equal(kept.design.present, it.point.design.present):
+        return it
+    for share in _BACK:
+        trial = attempt_towards(search, it, kept.design, share)
+        if trial is not None and violation(search, trial) <= 0.0 and trial.objective < kept.objective:
+            return accepted(search, it, trial)
+        it = noted(search, it, trial or it.point, False)
+    return it
 
 
 def _rounds(search: Search, it: Iterate, least: int) -> Iterate:

@@ -88,6 +88,19 @@ def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indi
         return None
 
 
+def attempt_towards(search: Search, it: Iterate, other: Design, share: float) -> Evaluated | None:
+    """The design a `share` of the straight way from the point's to the `other` one, of the same cables. None
+    where it leaves the stable branch."""
+    evaluator, own = search.evaluator, it.point.design
+    rest = own.rest_length + share * (other.rest_length - own.rest_length)
+    radius = own.radius + share * (other.radius - own.radius)
+    design = evaluator.rounded(replace(own, rest_length=rest, radius=radius))
+    try:
+        return evaluator.evaluate(design, evaluator.predicted(it.point, design), it.stage)
+    except OffBranch:
+        return None
+
+
 def sound(search: Search, before: Accepted) -> Evaluated | None:
     """The same design in the states to which the documented path leads, without its slack cables; None where
     it doesn't bear all loads there, breaks a constraint, or is worse than it was: of two equilibria side by

@@ -101,7 +101,7 @@ def test_half_of_the_evaluations_left_to_thinning_are_kept_only_under_the_whole_
         monkeypatch.setattr(descent, "_settled", lambda *_: "")
         monkeypatch.setattr(descent, "attempt", tried)
         monkeypatch.setattr(descent, "noted", lambda search, it, point, kept: it)
-        descent.descend(search, iterate(broken, stage=stage), least=3)
+        descent.descend(search, iterate(broken, stage=stage, accepted=()), least=3)
         assert search.evaluator.evaluations == spent
 
 
@@ -131,6 +131,65 @@ def test_a_descent_ends_where_its_last_design_that_keeps_every_limit_is(descendi
     assert kept[0].point is descending.trial
     monkeypatch.setattr(descent, "within_limits", lambda search, it: replace(it, point="before"))
     assert descent.descend(searching(1), iterate(point(2.0))).point == "before"
+
+
+@pytest.fixture
+def broken(monkeypatch):
+    """A descent that has ended where a limit is broken by 1 %, after a design that keeps all, and what trials
+    a share of the way back come to: (violation, objective), None where they leave the branch."""
+    cables = SimpleNamespace(present=np.ones(5, dtype=bool))
+    kept = SimpleNamespace(violation=0.0, objective=0.9, design=cables)
+    point = SimpleNamespace(violation=0.01, objective=0.2, design=cables)
+    told = SimpleNamespace(it=iterate(point, accepted=(kept, point)), outcomes={}, asked=[], noted=[])
+
+    def towards(search, it, other, share):
+        assert other is kept.design
+        told.asked.append(share)
+        outcome = told.outcomes[share]
+        return outcome and SimpleNamespace(violation=outcome[0], objective=outcome[1], design=cables)
+
+    monkeypatch.setattr(descent, "violation", lambda search, point: point.violation)
+    monkeypatch.setattr(descent, "_rounds", lambda search, it, least: it)
+    monkeypatch.setattr(descent, "attempt_towards", towards)
+    monkeypatch.setattr(descent, "noted", lambda search, it, point, kept: told.noted.append(point) or it)
+    monkeypatch.setattr(
+        descent, "accepted", lambda search, it, point: replace(it, accepted=(*it.accepted, point))
+    )
+    return told
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "asked", "objective"),
+    [
+        ({1 / 16: (0.0, 0.21)}, [1 / 16], 0.21),
+        ({1 / 16: (0.002, 0.21), 1 / 4: (0.0, 0.3)}, [1 / 16, 1 / 4], 0.3),
+        ({1 / 16: None, 1 / 4: (0.0, 0.3)}, [1 / 16, 1 / 4], 0.3),
+        ({1 / 16: (0.002, 0.21), 1 / 4: (0.001, 0.3)}, [1 / 16, 1 / 4], 0.2),
+        ({1 / 16: (0.0, 0.95), 1 / 4: (0.0, 0.9)}, [1 / 16, 1 / 4], 0.2),
+    ],
+)
+def test_a_descent_that_ends_beyond_a_limit_goes_back_as_little_as_keeps_it(
+    broken, outcomes, asked, objective
+):
+    broken.outcomes.update(outcomes)
+    found = descent.descend("search", broken.it)
+    assert broken.asked == asked
+    assert found.accepted[-1].objective == objective
+    assert len(broken.noted) == len(asked) - (objective != 0.2), "what leads nowhere is told, too"
+
+
+def test_a_descent_goes_back_from_no_design_that_keeps_its_limits_nor_to_one_of_other_cables(broken):
+    before, last = broken.it.accepted
+    others = SimpleNamespace(present=np.array([1, 1, 1, 1, 0], dtype=bool))
+    sound = SimpleNamespace(violation=0.0, objective=0.2, design=last.design)
+    for changes in (
+        {"point": sound},
+        {"accepted": (last,)},
+        {"accepted": (before, SimpleNamespace(violation=0.0, objective=0.5, design=others), last)},
+    ):
+        it = replace(broken.it, **changes)
+        assert descent.descend("search", it) is it
+    assert broken.asked == []
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,12 @@ import pytest
 import shellform as sf
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser import trials
+from shellform.optimiser.optimise import begin
 from shellform.optimiser.search_state import Accepted, Iterate
 from shellform.problem.evaluation import OffBranch
 from shellform.reliability.requirements import FRESH
 from shellform.reliability.trial_structures import JudgedTrial
+from tests.problems import misfit_and_force
 
 NONE = np.zeros(0)
 
@@ -282,3 +284,26 @@ def test_an_accepted_trial_is_kept_at_the_stage_that_it_reaches(monkeypatch):
     it, point, kept = trials.accepted(None, iterate(accepted=("first",)), "trial")
     assert it.accepted == ("first", "design of trial, raised")
     assert (point, kept, it.stage) == ("trial, raised", True, 0.75)
+
+
+def test_a_trial_towards_another_design_lies_on_the_straight_way_to_it(dome):
+    problem = misfit_and_force(dome, 2.0, most=200.0, rms=None)
+    start = dome.design()
+    search, it = begin(problem, start, sf.SequentialConvex(), lambda softest: 0.0, 10)
+    other = replace(start, rest_length=0.996 * start.rest_length)
+    found = trials.attempt_towards(search, it, other, 0.25)
+    np.testing.assert_allclose(found.design.rest_length, 0.999 * start.rest_length)
+    assert found.objective != it.point.objective
+    np.testing.assert_array_equal(
+        trials.attempt_towards(search, it, other, 0.0).design.rest_length, it.point.design.rest_length
+    )
+
+
+def test_a_trial_towards_another_design_that_leaves_the_branch_is_none(monkeypatch):
+    def leaves(*_):
+        raise OffBranch
+
+    own = Design(np.ones(3), np.ones(3, dtype=bool), 0.01)
+    evaluator = SimpleNamespace(rounded=lambda design: design, predicted=lambda *_: {}, evaluate=leaves)
+    it = iterate(point=SimpleNamespace(design=own))
+    assert trials.attempt_towards(searching(evaluator=evaluator), it, own, 0.5) is None
