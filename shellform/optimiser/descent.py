@@ -79,7 +79,8 @@ def _brought_within(search: Search, it: Iterate) -> Iterate:
     for share in _BACK:
         trial = attempt_towards(search, it, kept.design, share)
         if trial is not None and violation(search, trial) <= 0.0 and trial.objective < kept.objective:
-            return accepted(search, it, trial)
+            status = it.status and f"{it.status}; a little before that one, within its limits"
+            return accepted(search, replace(it, status=status), trial)
         it = noted(search, it, trial or it.point, False)
     return it
 
