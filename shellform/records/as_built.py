@@ -146,7 +146,14 @@ def _drawn(design: DesignRecord, load: str, rods: RodsOf, fallen: int, safety: A
         remedy = rods.stronger(1.0 / lowest if lowest > 0.0 else math.inf)
         return Cell(words, False, safety.required, remedy, own.standing / own.drawn)
     enough, caution = own.drawn >= safety.drawn, _snapping(own, safety.snap)
-    return Cell(words, True if enough else None, safety.required, "", own.standing / own.drawn, caution)
+    return Cell(
+        words,
+        True if enough else None,
+        safety.required,
+        "",
+        own.standing / own.drawn,
+        caution * safety.required,
+    )
 
 
 def _snapping(own: StandingRecord, most: Farthest | None) -> str:

@@ -3,7 +3,8 @@ sampling goes on where it stopped and isn't done again for a design that is stil
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import statistics
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -25,11 +26,14 @@ class DrawnSnap:
 @dataclass(frozen=True)
 class DrawnShape:
     """Structure `number` at rest under the design load: how far, m, its nodes are from their places on the
-    target, `deviation_max` and `deviation_mean`."""
+    target, `deviation_max` and `deviation_mean`; the largest stress in its rods over their strength (0: that
+    isn't known), and how much a cable pulls at most, N (None: of older runs)."""
 
     number: int
     deviation_max: float
     deviation_mean: float
+    stress_utilisation_max: float | None = None
+    cable_force_max: float | None = None
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,12 @@ class DrawnPath:
     stand: tuple[bool, ...] = ()
     snaps: tuple[DrawnSnap, ...] = ()
     shapes: tuple[DrawnShape, ...] = ()
+
+
+def median_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
+    """The median and the largest of the values; None where one of them isn't known."""
+    known = [each for each in values if each is not None]
+    return (statistics.median(known), max(known)) if known and len(known) == len(values) else (None, None)
 
 
 @dataclass(frozen=True)

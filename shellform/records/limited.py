@@ -8,12 +8,12 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from shellform.quantities import newtons
+from shellform.quantities import newtons, number
 from shellform.records.as_built import AsBuilt
-from shellform.records.check import SLACK, UNKNOWN, Cell, Check, below, on_worse_mesh, quantity
+from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, on_worse_mesh, quantity
 from shellform.records.remedies import RodSizes, RodsOf, allow, allow_less, rounded_up
 from shellform.records.summary import DesignRecord, LoadRecord
-from shellform.records.words import load_title
+from shellform.records.words import exceeds, load_title
 
 
 @dataclass(frozen=True)
@@ -147,10 +147,58 @@ def limited(rows: Mapping[str, DesignRecord], rods: Mapping[str, RodsOf], bounds
     found = [
         _at_most(pulled, bounds.force, rows, rods),
         *(_at_most(each, each.most, rows, rods) for each in limits if each.most is not None),
+        *_strained_as_built(rows, designs, bounds.force),
     ]
     if bounds.slack is not None:
         found += [_taut(rows, designs, load, bounds.slack) for load in bounds.slack_loads]
     return found
+
+
+def _strained_as_built(rows: Mapping[str, DesignRecord], designs: Sequence[str], force: float) -> list[Check]:
+    """What rods and cables bear as built under the design load, where it is known: told, and not asked for;
+    what is beyond the strength or `force`, N, asks for care."""
+    shapes = {name: row.loads["design"].built_shape for name, row in rows.items() if "design" in row.loads}
+    rods, cables = {}, {}
+    for name, own in shapes.items():
+        if own is None or name not in designs:
+            continue
+        usual, worst = own.stress_utilisation_max, own.stress_utilisation_max_worst
+        if usual and worst:
+            found = f"{number(100.0 * usual)} % of the strength, {number(100.0 * worst)} % in the worst"
+            rods[name] = Cell(found, None, False, caution=_broken_words(found) if worst > 1.0 else "")
+        usual, worst = own.cable_force_max, own.cable_force_max_worst
+        if usual and worst:
+            found = f"{newtons(usual)}, {newtons(worst)} in the worst"
+            cables[name] = Cell(
+                found, None, False, caution=_pulled_words(found) if exceeds(worst, force) else ""
+            )
+    return [
+        Check(
+            title,
+            f"told, in the median of structures; {limit}",
+            {name: own.get(name, UNASKED) for name in designs},
+        )
+        for title, limit, own in (
+            ("Rods' stress as built under the design load", "100 % breaks them", rods),
+            (
+                "Largest cable force as built under the design load",
+                f"{newtons(force)} are cable.force_max",
+                cables,
+            ),
+        )
+        if own
+    ]
+
+
+def _broken_words(found: str) -> str:
+    return (
+        f"{found}, which breaks rods. Look first at their short ends beside supports, which a support some millimetres off bends: "
+        "fit supports to where the ends lie, or say in tolerances.supports how near they are set"
+    )
+
+
+def _pulled_words(found: str) -> str:
+    return f"{found}, more than cable.force_max. Tension cables by their force, not by their length alone, or take stronger ones"
 
 
 def _at_most(

@@ -46,7 +46,7 @@ def _cautions(found: Sequence[Check], design: str) -> tuple[str, ...]:
     named: dict[str, list[str]] = {}
     for check in found:
         cell = check.cells.get(design, UNASKED)
-        if cell.asked and cell.caution:
+        if cell.caution:
             named.setdefault(cell.caution, []).append(check.name)
     return tuple(f"{', '.join(run_on(names))}: {caution}." for caution, names in named.items())
 

@@ -117,8 +117,21 @@ def built_shape_words(own: BuiltShapeRecord) -> str:
     )
     return (
         f"as built {most} mm off at most and {mean} mm in the mean, in the median of {own.structures} structures, "
-        f"{worst} mm in the worst{driven_words(own)}"
+        f"{worst} mm in the worst{driven_words(own)}{_strain_words(own)}"
     )
+
+
+def _strain_words(own: BuiltShapeRecord) -> str:
+    """How much rods and cables bear as built; "" of older runs."""
+    found = ""
+    if own.stress_utilisation_max and own.stress_utilisation_max_worst:
+        usual, worst = (
+            number(100.0 * x) for x in (own.stress_utilisation_max, own.stress_utilisation_max_worst)
+        )
+        found += f", rods at {usual} % of their strength ({worst} % in the worst)"
+    if own.cable_force_max and own.cable_force_max_worst:
+        found += f", a cable at {newtons(own.cable_force_max)} ({newtons(own.cable_force_max_worst)})"
+    return found
 
 
 def driven_words(own: BuiltShapeRecord) -> str:

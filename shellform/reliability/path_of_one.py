@@ -19,6 +19,7 @@ from shellform.reliability.perfect import Perfect
 from shellform.reliability.resting import Resting
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State, motion, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -63,7 +64,7 @@ class DrawnOutcome:
     - `state`: its last one on the branch; `snaps`: local ones on the way.
     - `factorisations` spent.
     - `resting`: its state at rest under a share of the load, where that was asked for; None where it fell
-      before.
+      before. `beams`, `cables`: its own, of which that is.
     """
 
     number: int
@@ -74,6 +75,8 @@ class DrawnOutcome:
     factorisations: int
     snaps: tuple[Snap, ...] = ()
     resting: State | None = None
+    beams: Beams | None = None
+    cables: Cables | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +165,11 @@ class Loading(Branch):
             self.snaps.clear()
             there, factor = self.borne(share, step, smallest)
             there = there if factor >= share else None
-        resting = None if there is None else there.state
-        return replace(found, resting=resting, factorisations=self.spent)
+        found = replace(found, factorisations=self.spent)
+        if there is None:
+            return found
+        beams, cables = cast(tuple[Beams, Cables], tuple(self.assembly.parts))
+        return replace(found, resting=there.state, beams=beams, cables=cables)
 
     def borne(
         self, most: float, step: float, smallest: float, *, marks: Sequence[float] = ()

@@ -23,7 +23,7 @@ from shellform.case.entries import StockRodEntry
 from shellform.errors import NotConverged
 from shellform.records.as_built import falls, keeps_factor
 from shellform.records.checks import BUILT
-from shellform.records.drawn import DrawnPath, take_drawn
+from shellform.records.drawn import DrawnPath, median_and_worst, take_drawn
 from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.progress import Event, Kind
 from shellform.records.summary import (
@@ -320,6 +320,8 @@ def _built_shape(path: DrawnPath, each: Examined, seed: int) -> BuiltShapeRecord
         max(largest),
         float(np.median(means)),
         moved_by_cause(nominal, each.tolerances, seed=seed),
+        *median_and_worst([each.stress_utilisation_max for each in path.shapes]),
+        *median_and_worst([each.cable_force_max for each in path.shapes]),
     )
 
 

@@ -14,6 +14,7 @@ import shellform
 from shellform.arrays import Reals, Record
 from shellform.compiled import clock_without_compiling
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.layers import rod_stress
 from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.paths import deviations
 from shellform.records.drawn import DrawnPath, DrawnShape, DrawnSnap, read_drawn, write_drawn
@@ -124,7 +125,7 @@ def drawn_of(
                 *path.snaps,
                 *(DrawnSnap(each.number, snap.factor, snap.far) for each in some for snap in each.snaps),
             ),
-            (*path.shapes, *_shapes(examined.shell, some)),
+            (*path.shapes, *_shapes(examined, some)),
         )
         kept = kept.also(load, path)
         write_drawn(folder, examined.name, kept)
@@ -138,9 +139,18 @@ def drawn_of(
     )
 
 
-def _shapes(shell: Gridshell, outcomes: Sequence[DrawnOutcome]) -> Iterator[DrawnShape]:
+def _shapes(examined: Examined, outcomes: Sequence[DrawnOutcome]) -> Iterator[DrawnShape]:
     """Of the first structures, those that rest under the design load."""
+    shell, section = examined.shell, examined.shell.rod.resized(examined.design.radius).section
     for each in outcomes:
-        if each.resting is not None and each.number < LOOKED_AT:
-            far = deviations(shell, each.resting)
-            yield DrawnShape(each.number, float(far.max()), float(far.mean()))
+        state, beams, cables = each.resting, each.beams, each.cables
+        if state is None or beams is None or cables is None or each.number >= LOOKED_AT:
+            continue
+        far = deviations(shell, state)
+        yield DrawnShape(
+            each.number,
+            float(far.max()),
+            float(far.mean()),
+            float(rod_stress(section, beams, beams.local_forces(state)).max() / section.material.strength),
+            float(cables.tension(state).max(initial=0.0)),
+        )

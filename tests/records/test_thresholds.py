@@ -435,6 +435,33 @@ def test_the_largest_cable_force_is_that_before_any_load_or_of_the_worst(shell, 
     assert found(shell, designs)[name].found == "7 N", "the design's own where no load's is known"
 
 
+def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_breaks_them(shell, designs):
+    rods, cables = (
+        "Rods' stress as built under the design load",
+        "Largest cable force as built under the design load",
+    )
+
+    def made(stress, pull):
+        shape = BuiltShapeRecord(20, 0.003, 0.004, 0.001, {}, stress[0], stress[1], pull[0], pull[1])
+        return found(shell, designs, "design", built_shape=shape)
+
+    own = made((0.9, 0.999), (18.0, 20.0))
+    assert (own[rods].found, own[rods].asked) == ("90 % of the strength, 99.9 % in the worst", False)
+    assert own[cables].found == "18 N, 20 N in the worst"
+    assert own[rods].caution == own[cables].caution == ""
+    own = made((1.06, 1.3), (18.0, 26.0))
+    assert own[rods].caution.startswith("106 % of the strength, 130 % in the worst, which breaks rods")
+    assert own[cables].caution.startswith("18 N, 26 N in the worst, more than cable.force_max")
+    assert verdict_of(own).cautions[0].startswith(f"{rods}: 106 % of the strength")
+    for nothing in ((None, None), (0.0, 0.0)):
+        assert not {rods, cables} & made(nothing, nothing).keys(), "not known, or no cables"
+
+
+def verdict_of(cells):
+    """Of one design, of which these cells are known."""
+    return verdict([Check(name, "limit", {"polished": cell}) for name, cell in cells.items()], "polished")
+
+
 @pytest.mark.parametrize(("most", "holds"), [(99, False), (100, True), (101, True)])
 def test_cables_are_counted_against_what_was_asked_for(shell, designs, most, holds):
     record = optimisation(cables_max=CableCountRecord(most, 100, False))
@@ -570,6 +597,10 @@ def test_words_of_the_shape_as_built_name_what_drives_it():
         "the supports' places"
     )
     assert built_shape_words(replace(shape, causes={})).endswith("67 mm in the worst")
+    strained = replace(shape, stress_utilisation_max=1.084, stress_utilisation_max_worst=1.29)
+    assert built_shape_words(strained).endswith(", rods at 108 % of their strength (129 % in the worst)")
+    pulled = replace(shape, cable_force_max=18.04, cable_force_max_worst=26.0)
+    assert built_shape_words(pulled).endswith(", a cable at 18 N (26 N)")
 
 
 def test_what_fewer_cables_cost_of_the_shape_as_built_is_told_from_a_quarter_on_with_what_keeps_it():

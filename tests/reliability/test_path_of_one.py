@@ -97,12 +97,14 @@ def test_at_rest_under_a_share_a_structure_goes_back_along_its_branch_or_from_no
         return here("from nothing"), share
 
     loading = loading_of(at=lambda state: f"at {state}", step=step, borne=borne, snaps=["snapped"])
+    loading.assembly = SimpleNamespace(parts=("its beams", "its cables"))
     assert loading.rested(outcome(1.0), 0.7, 0.5, 1 / 64).resting == "back at rest"
     assert loading.rested(outcome(1.0, 0.3), 0.7, 0.5, 1 / 64).resting == "back at rest", "it snaps before"
     assert ways == [("back", "at end", 0.7, True)] * 2
     ways.clear()
     found = loading.rested(outcome(1.0, 0.3, 0.7), 0.7, 0.5, 1 / 64)
     assert (found.resting, found.factorisations) == ("from nothing", 20)
+    assert (found.beams, found.cables) == ("its beams", "its cables")
     assert ways == [("from nothing", 0.7, 0.5, 1 / 64, [])]
     ways.clear()
     loading.at = lambda state: here(state)

@@ -290,6 +290,15 @@ def test_of_the_shapes_as_built_medians_and_the_worst_are_told(monkeypatch):
         4, pytest.approx(0.055), 0.09, pytest.approx(0.0175), {"marks": 0.007}
     )
     assert examination._built_shape(PATH, examined(), 7) is None
+    strained = tuple(
+        replace(each, stress_utilisation_max=share, cable_force_max=50.0 * share)
+        for each, share in zip(shapes, (1.1, 0.8, 1.6, 1.2), strict=True)
+    )
+    found = examination._built_shape(replace(path, shapes=strained), examined(), 7)
+    assert (found.stress_utilisation_max, found.stress_utilisation_max_worst) == (pytest.approx(1.15), 1.6)
+    assert (found.cable_force_max, found.cable_force_max_worst) == (pytest.approx(57.5), pytest.approx(80.0))
+    mixed = examination._built_shape(replace(path, shapes=(shapes[0], *strained[1:])), examined(), 7)
+    assert mixed.stress_utilisation_max is None, "some were looked at by a version that didn't tell it"
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from shellform.net.net import Net
 from shellform.quantities import newtons, number
 from shellform.records.check import SLACK, Cell
 from shellform.records.raising import WayUpRecord, easiest
-from shellform.records.summary import DocumentsRecord, LoadRecord, Summary
+from shellform.records.summary import BuiltShapeRecord, DocumentsRecord, LoadRecord, Summary
 from shellform.records.words import (
     confidence_words,
     driven_words,
@@ -88,7 +88,7 @@ def answers(
     stressed = (
         ""
         if main is None or not math.isfinite(shell.rod.strength)
-        else f"; at {100 * main.stressed:.0f} % of their strength"
+        else f"; at {100 * main.stressed:.0f} % of their strength{_as_built(main.built_shape)}"
     )
     locked = "" if layers_of(section) == 1 else "; bent lath by lath, then locked by shear blocks"
     found.append(
@@ -154,6 +154,16 @@ def _slack(main: LoadRecord | None, before: LoadRecord | None) -> str:
     ]
     none = before is not None and before.slack is not None
     return "".join(found) or ("; none slack before the load" if none else "")
+
+
+def _as_built(shape: BuiltShapeRecord | None) -> str:
+    """What the rods of structures as built bear."""
+    if shape is None or not shape.stress_utilisation_max or not shape.stress_utilisation_max_worst:
+        return ""
+    usual, worst = (
+        100.0 * each for each in (shape.stress_utilisation_max, shape.stress_utilisation_max_worst)
+    )
+    return f" as planned, {usual:.0f} as built, where they are stressed most ({worst:.0f} in the worst structure)"
 
 
 def _stands_on(net: Net, more: LoadRecord | None, loads: Mapping[str, LoadRecord]) -> Answer:
