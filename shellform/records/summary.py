@@ -13,6 +13,7 @@ from typing import Any
 
 from shellform.errors import Damaged, InputError
 from shellform.net.quality import NetNumbers
+from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.files import ANEW, plain, read_record, text_of
 from shellform.records.optimisation import OptimisationRecord, SectionRecord
@@ -99,26 +100,6 @@ class StandingRecord:
     lowest: float | None = None
     snapped: int = 0
     snap: float = 0.0
-
-
-@dataclass(frozen=True)
-class BuiltShapeRecord:
-    """The shape of so many `structures` drawn as they would be built, at rest under the load: of their nodes'
-    largest distances from the target, m, the median, `deviation_max`, and the largest, `deviation_max_worst`;
-    the median of their mean distances, `deviation_mean`. To first order each of the `causes` of error, by
-    name, moves a node by so much, m, root mean square, where it is the only one. Of the largest stresses in
-    their rods, over the strength, and of their largest cable forces, N, the medians and the largest (None: of
-    older runs)."""
-
-    structures: int
-    deviation_max: float
-    deviation_max_worst: float
-    deviation_mean: float
-    causes: Mapping[str, float] = field(default_factory=dict)
-    stress_utilisation_max: float | None = None
-    stress_utilisation_max_worst: float | None = None
-    cable_force_max: float | None = None
-    cable_force_max_worst: float | None = None
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from shellform.quantities import newtons, number
+from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.failures import RareRecord
 from shellform.records.raising import SCAFFOLD, WayUpRecord, easiest
-from shellform.records.summary import BuiltShapeRecord, DesignRecord, StandingRecord, Summary
+from shellform.records.summary import DesignRecord, StandingRecord, Summary
 
 _SPENT = 1.25  # times the initial design's deviation as built, from which on it is worth a word
 _LISTED = 8  # names, where there are more of them

@@ -22,18 +22,12 @@ from shellform.case.case import Case
 from shellform.case.entries import StockRodEntry
 from shellform.errors import NotConverged
 from shellform.records.as_built import falls, keeps_factor
+from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.checks import BUILT
 from shellform.records.drawn import DrawnPath, median_and_worst, take_drawn
 from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.progress import Event, Kind
-from shellform.records.summary import (
-    BuiltShapeRecord,
-    DesignRecord,
-    LoadRecord,
-    StandingRecord,
-    Summary,
-    write_summary,
-)
+from shellform.records.summary import DesignRecord, LoadRecord, StandingRecord, Summary, write_summary
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, open_checks, to_build
 from shellform.reliability.failure import explained

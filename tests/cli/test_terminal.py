@@ -11,9 +11,10 @@ import typer
 from shellform.cli import design as commands
 from shellform.cli.terminal import Spinner, refusal_words, tell_as_built, tell_cases, tell_designs
 from shellform.errors import InputError, NotConverged
+from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.failures import FailureRecord
 from shellform.records.optimisation import SectionRecord
-from shellform.records.summary import BuiltShapeRecord, StandingRecord, VerdictRecord
+from shellform.records.summary import StandingRecord, VerdictRecord
 from tests.records.made import design, load, optimisation, summary
 
 

@@ -20,8 +20,9 @@ from shellform.output.page.embed import embed
 from shellform.output.page.first_answers import answers
 from shellform.output.page.shown_run import ShownRun
 from shellform.quantities import number
+from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.check import Cell, Check
-from shellform.records.summary import BuiltShapeRecord, DocumentsRecord, StandingRecord, VerdictRecord
+from shellform.records.summary import DocumentsRecord, StandingRecord, VerdictRecord
 from shellform.records.words import constraint_titles
 from shellform.structure.elements.state import State
 from tests.net.edge_shells import barrel

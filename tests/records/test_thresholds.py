@@ -8,13 +8,14 @@ import pytest
 from shellform.quantities import force_unit, newtons, number
 from shellform.records import words
 from shellform.records.as_built import AsBuilt, critical_checks, falls, guide_checks, standing_checks
+from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.check import SLACK, Cell, Check, below, quantity, share_of
 from shellform.records.checks import checks
 from shellform.records.limited import Bounds
 from shellform.records.optimisation import CableCountRecord
 from shellform.records.raising import WayUpRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow
-from shellform.records.summary import BuiltShapeRecord, StandingRecord
+from shellform.records.summary import StandingRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, headline, to_build, verdict
 from shellform.records.words import (

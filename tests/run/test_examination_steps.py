@@ -9,9 +9,10 @@ import pytest
 
 from shellform.errors import NotConverged
 from shellform.gridshell.tolerances import Tolerances
+from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.drawn import DrawnPath, DrawnShape, DrawnSnap
 from shellform.records.progress import Kind
-from shellform.records.summary import BuiltShapeRecord, StandingRecord
+from shellform.records.summary import StandingRecord
 from shellform.reliability.path_of_one import SOUGHT
 from shellform.run import examination
 from shellform.run.sampling import Clock, Examined

@@ -17,9 +17,10 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.quantities import newtons, number
+from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.check import SLACK, Cell
 from shellform.records.raising import WayUpRecord, easiest
-from shellform.records.summary import BuiltShapeRecord, DocumentsRecord, LoadRecord, Summary
+from shellform.records.summary import DocumentsRecord, LoadRecord, Summary
 from shellform.records.words import (
     confidence_words,
     driven_words,
