@@ -192,7 +192,7 @@ def _strained_as_built(rows: Mapping[str, DesignRecord], designs: Sequence[str],
 
 def _broken_words(found: str) -> str:
     return (
-        f"{found}, which breaks rods. Look first at their short ends beside supports, which a support some millimetres off bends: "
+        f"{found}, which breaks rods. Look first at short ends beside supports, bent where a support is off: "
         "fit supports to where the ends lie, or say in tolerances.supports how near they are set"
     )
 
