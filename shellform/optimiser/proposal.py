@@ -158,10 +158,9 @@ def _as_far_as_can_be(
     low: Reals,
     high: Reals,
 ) -> Reals | None:
-    """The model's optimum in windows (y,) where more is asked for than a step can give; `count` of the values
-    are the problem's, the others guards'. Of what limits are
-    broken by a share t remains, of what aims miss and of what guards ask for others, 0 <= t <= 1, each at its
-    price."""
+    """The model's optimum in windows (y,) where more is asked for than a step can give; the first `count` of
+    the values are constraints', the others guards'. Of what limits are broken by a share t remains, of what
+    aims miss and of what guards ask for others, 0 <= t <= 1, each at its price."""
     size, price = len(slope), task.solver.penalty
     limits = count - task.aims
     kinds = [(slice(limits), price), (slice(count, None), price)]
