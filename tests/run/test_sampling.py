@@ -35,6 +35,8 @@ class Bench:
                 stands=number % 5 != 4,
                 snaps=[SimpleNamespace(factor=0.5, far=0.01 * number)] if number % 5 == 4 else [],
                 resting=None if resting is None or number % 3 == 2 else number,
+                beams=SimpleNamespace(local_forces=lambda state: 10.0 * state),
+                cables=SimpleNamespace(tension=lambda state: np.array([0.0, 2.0 * state])),
             )
             for number in numbers
         ]
@@ -53,11 +55,18 @@ def draw(monkeypatch, tmp_path):
     monkeypatch.setattr(sampling, "clock_without_compiling", ticking)
     monkeypatch.setattr(Examined, "key", lambda *_: "key")
     monkeypatch.setattr(sampling, "deviations", lambda shell, state: np.array([0.0, 0.002, 0.001 * state]))
+    monkeypatch.setattr(
+        sampling, "rod_stress", lambda section, beams, forces: np.array([[50.0, forces + section.own]])
+    )
+    section = SimpleNamespace(own=100.0, material=SimpleNamespace(strength=200.0))
+    rods = {0.02: SimpleNamespace(section=section)}
+    shell = SimpleNamespace(rod=SimpleNamespace(resized=rods.get))
+    design = SimpleNamespace(radius=0.02)
     (tmp_path / "designs").mkdir()
 
     def drawn(count, clock, heard):
         return drawn_of(
-            tmp_path, Examined("one", None, None, LOADS, "tolerances"), "additional", count=count, seed=7,
+            tmp_path, Examined("one", shell, design, LOADS, "tolerances"), "additional", count=count, seed=7,
             clock=clock, tell=heard.append,
         )  # fmt: skip
 
@@ -75,7 +84,9 @@ def test_structures_are_drawn_by_tens_and_those_that_were_kept_are_not_drawn_aga
     assert path.stand == tuple(number not in (4, 9) for number in range(13))
     assert path.snaps == (DrawnSnap(4, 0.5, 0.04), DrawnSnap(9, 0.5, 0.09))
     assert [each.number for each in path.shapes] == [0, 1, 3, 4, 6, 7, 9, 10, 12]
-    assert path.shapes[-1] == DrawnShape(12, pytest.approx(0.012), pytest.approx(0.014 / 3))
+    assert path.shapes[-1] == DrawnShape(
+        12, pytest.approx(0.012), pytest.approx(0.014 / 3), pytest.approx(1.1), 24.0
+    ), "of its own beams, over the strength, and of its own cables"
     assert read_drawn(tmp_path, "one", "key").paths["additional"] == path
     again = draw(25, clock, heard)
     assert [numbers for numbers, _, _ in Bench.asked[2:]] == [list(range(13, 23)), [23, 24]]
