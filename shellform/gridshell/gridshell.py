@@ -21,7 +21,7 @@ from shellform.arrays import Flags, Indices, Reals, Record, flags, indices, real
 from shellform.errors import InputError, require_number
 from shellform.gridshell.candidates import candidate_cables
 from shellform.gridshell.edge_beams import EdgeBeam, edge_beams
-from shellform.gridshell.layers import LOCK, locks, rod_bending_stress, rod_forces, rod_stress
+from shellform.gridshell.layers import LOCK, locks, rod_bending_stress, rod_forces, rod_utilisation
 from shellform.gridshell.loads import points
 from shellform.gridshell.possible_rods import refuse_thick, require_section
 from shellform.net.grid import ROD, grid_beams
@@ -318,9 +318,7 @@ class Gridshell(Record):
 
     def utilisation(self, design: Design, state: State) -> Reals:
         """Largest fibre stress (r,) of the rods' elements over their strength; 0 where it isn't known."""
-        section, beams = self.rod.resized(design.radius).section, self.beams(design.radius)
-        stress = rod_stress(section, beams, beams.local_forces(state))
-        return np.asarray(stress.max(axis=1) / section.material.strength)
+        return rod_utilisation(self.rod.resized(design.radius).section, self.beams(design.radius), state)
 
     def bending_utilisation(self, design: Design, state: State) -> Reals:
         """Bending stress (r, 2) at both ends of the rods' elements over their flexural strength, M r / (I

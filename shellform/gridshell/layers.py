@@ -168,6 +168,12 @@ def rod_stress(section: Section, beams: Beams, forces: Reals) -> Reals:
     return result + _couples(section, beams, forces)
 
 
+def rod_utilisation(section: Section, beams: Beams, state: State) -> Reals:
+    """Largest fibre stress (r,) of the rods' elements over their strength; 0 where that isn't known."""
+    stress = rod_stress(section, beams, beams.local_forces(state))
+    return np.asarray(stress.max(axis=1) / section.material.strength)
+
+
 def rod_bending_stress(section: Section, beams: Beams, forces: Reals) -> Reals:
     """The same without the axial force of the rod."""
     own = forces[beams.of_kind(ROD)]

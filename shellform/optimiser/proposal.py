@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -65,6 +66,18 @@ class Task(Record):
     aims: int
 
 
+class Asked(NamedTuple):
+    """A quadratic problem in windows u (y,), as `minimise_quadratic` takes it: least slope'u + u'H u/2 with
+    rows u + values <= 0, low <= u <= high."""
+
+    curvature: Reals | LowRank
+    slope: Reals
+    rows: Reals
+    values: Reals
+    low: Reals
+    high: Reals
+
+
 def propose(task: Task) -> tuple[Reals, float]:
     """The y (y,) of the model's optimum within the window, and the change of the objective that it
     predicts.
@@ -91,13 +104,13 @@ def propose(task: Task) -> tuple[Reals, float]:
 
     def solved(falls: Reals, margins: Reals) -> Reals:
         rows, limits = np.vstack([scaled_rows, falls]), np.append(values, margins)
-        asked = scaled_curvature, scaled_slope, rows, limits, low, high
+        asked = Asked(scaled_curvature, scaled_slope, rows, limits, low, high)
         if task.groups is not None:
-            return _equal_steps(task, width, *asked)
+            return _equal_steps(task, width, asked)
         # an aim is met as far as that is worth its price, even if it could be met
         u = None if _at_their_price(task, values) else minimise_quadratic(*asked)
         if u is None:
-            u = _as_far_as_can_be(task, len(values), *asked)
+            u = _as_far_as_can_be(task, len(values), asked)
         elif not task.guards and len(limits) <= _FEW:
             u = _from_there(evaluate, np.clip(u, low, high), low, high, task.solver.model_evaluations)
         return np.clip(np.zeros(len(width)), low, high) if u is None else u
@@ -148,19 +161,11 @@ def _from_there(
     return found if kept and after <= before else start
 
 
-def _as_far_as_can_be(
-    task: Task,
-    count: int,
-    curvature: Reals | LowRank,
-    slope: Reals,
-    rows: Reals,
-    values: Reals,
-    low: Reals,
-    high: Reals,
-) -> Reals | None:
+def _as_far_as_can_be(task: Task, count: int, asked: Asked) -> Reals | None:
     """The model's optimum in windows (y,) where more is asked for than a step can give; the first `count` of
     the values are constraints', the others guards'. Of what limits are broken by a share t remains, of what
     aims miss and of what guards ask for others, 0 <= t <= 1, each at its price."""
+    curvature, slope, rows, values, low, high = asked
     size, price = len(slope), task.solver.penalty
     limits = count - task.aims
     kinds = [(slice(limits), price), (slice(count, None), price)]
@@ -226,19 +231,11 @@ def _slope(task: Task) -> Reals:
     return model.answers.by_variables(total)
 
 
-def _equal_steps(
-    task: Task,
-    width: Reals,
-    curvature: Reals | LowRank,
-    slope: Reals,
-    rows: Reals,
-    values: Reals,
-    low: Reals,
-    high: Reals,
-) -> Reals:
+def _equal_steps(task: Task, width: Reals, asked: Asked) -> Reals:
     """The model's optimum in windows (y,) among steps that change all rest lengths of a group by the same: u
     = W⁻¹ (∂l0/∂y)⁻¹ G v. What is broken may stay so.
     """
+    curvature, slope, rows, values, low, high = asked
     assert task.groups is not None
     assert isinstance(task.model.answers, WholeAnswers)
     assert isinstance(curvature, np.ndarray)

@@ -4,7 +4,7 @@ loads that a design doesn't bear whole.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -66,9 +66,8 @@ def attempt(search: Search, it: Iterate, model: StepModel, y: Reals) -> tuple[Ev
         rest[design.present] = averaged(rest[design.present], search.groups, every)
         design = replace(design, rest_length=rest)
     near = {**evaluator.predicted(it.point, design, but=search.base), search.base: model.predicted(y)}
-    try:
-        trial = evaluator.evaluate(evaluator.rounded(design), near, it.stage, lead=not it.guarded)
-    except OffBranch:
+    trial = _on_branch(search, it, design, near, lead=not it.guarded)
+    if trial is None:
         return None, it
     above = np.maximum(trial.constraints - model.constraints_at(y), 0.0) / it.window**2
     return trial, replace(it, excess=np.where(trial.constraints > -search.solver.near, above, 0.0))
@@ -77,26 +76,30 @@ def attempt(search: Search, it: Iterate, model: StepModel, y: Reals) -> tuple[Ev
 def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indices) -> Evaluated | None:
     """The design without the cables `leaving`, the others at the rest lengths that they have: the
     shell moves less than at their tensions. None where it leaves the stable branch."""
-    evaluator, design = search.evaluator, it.point.design
+    design = it.point.design
     rest = design.rest_length.copy()
     rest[np.flatnonzero(design.present)[leaving]] = model.longest[leaving]
-    try:
-        return evaluator.evaluate(
-            evaluator.rounded(replace(design, rest_length=rest)), it.point.states, it.stage
-        )
-    except OffBranch:
-        return None
+    return _on_branch(search, it, replace(design, rest_length=rest), it.point.states)
 
 
 def attempt_towards(search: Search, it: Iterate, other: Design, share: float) -> Evaluated | None:
     """The design a `share` of the straight way from the point's to the `other` one, of the same cables. None
     where it leaves the stable branch."""
-    evaluator, own = search.evaluator, it.point.design
+    own = it.point.design
     rest = own.rest_length + share * (other.rest_length - own.rest_length)
     radius = own.radius + share * (other.radius - own.radius)
-    design = evaluator.rounded(replace(own, rest_length=rest, radius=radius))
+    design = replace(own, rest_length=rest, radius=radius)
+    return _on_branch(search, it, design, search.evaluator.predicted(it.point, design))
+
+
+def _on_branch(
+    search: Search, it: Iterate, design: Design, near: Mapping[str, State], *, lead: bool = False
+) -> Evaluated | None:
+    """The design, rounded as it would be built, in the equilibria next to the states `near` it (Evaluator);
+    None where one of them leaves the stable branch."""
+    evaluator = search.evaluator
     try:
-        return evaluator.evaluate(design, evaluator.predicted(it.point, design), it.stage)
+        return evaluator.evaluate(evaluator.rounded(design), near, it.stage, lead=lead)
     except OffBranch:
         return None
 

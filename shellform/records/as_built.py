@@ -145,15 +145,9 @@ def _drawn(design: DesignRecord, load: str, rods: RodsOf, fallen: int, safety: A
         lowest = own.lowest or 0.0
         remedy = rods.stronger(1.0 / lowest if lowest > 0.0 else math.inf)
         return Cell(words, False, safety.required, remedy, own.standing / own.drawn)
-    enough, caution = own.drawn >= safety.drawn, _snapping(own, safety.snap)
-    return Cell(
-        words,
-        True if enough else None,
-        safety.required,
-        "",
-        own.standing / own.drawn,
-        caution * safety.required,
-    )
+    caution = _snapping(own, safety.snap) if safety.required else ""
+    holds = True if own.drawn >= safety.drawn else None
+    return Cell(words, holds, safety.required, "", own.standing / own.drawn, caution)
 
 
 def _snapping(own: StandingRecord, most: Farthest | None) -> str:

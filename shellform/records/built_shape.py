@@ -27,3 +27,17 @@ class BuiltShapeRecord:
     stress_utilisation_max_worst: float | None = None
     cable_force_max: float | None = None
     cable_force_max_worst: float | None = None
+
+    @property
+    def stress(self) -> tuple[float, float] | None:
+        """The rods' stress over their strength, the median and the largest; None where that isn't known."""
+        return _pair(self.stress_utilisation_max, self.stress_utilisation_max_worst)
+
+    @property
+    def pull(self) -> tuple[float, float] | None:
+        """The cables' force, N, the median and the largest; None where there are none or it isn't known."""
+        return _pair(self.cable_force_max, self.cable_force_max_worst)
+
+
+def _pair(usual: float | None, worst: float | None) -> tuple[float, float] | None:
+    return (usual, worst) if usual and worst else None

@@ -157,48 +157,41 @@ def limited(rows: Mapping[str, DesignRecord], rods: Mapping[str, RodsOf], bounds
 def _strained_as_built(rows: Mapping[str, DesignRecord], designs: Sequence[str], force: float) -> list[Check]:
     """What rods and cables bear as built under the design load, where it is known: told, and not asked for;
     what is beyond the strength or `force`, N, asks for care."""
-    shapes = {name: row.loads["design"].built_shape for name, row in rows.items() if "design" in row.loads}
-    rods, cables = {}, {}
-    for name, own in shapes.items():
-        if own is None or name not in designs:
-            continue
-        usual, worst = own.stress_utilisation_max, own.stress_utilisation_max_worst
-        if usual and worst:
-            found = f"{number(100.0 * usual)} % of the strength, {number(100.0 * worst)} % in the worst"
-            rods[name] = Cell(found, None, False, caution=_broken_words(found) if worst > 1.0 else "")
-        usual, worst = own.cable_force_max, own.cable_force_max_worst
-        if usual and worst:
-            found = f"{newtons(usual)}, {newtons(worst)} in the worst"
-            cables[name] = Cell(
-                found, None, False, caution=_pulled_words(found) if exceeds(worst, force) else ""
-            )
+    rods, cables = dict.fromkeys(designs, UNASKED), dict.fromkeys(designs, UNASKED)
+    for name in designs:
+        row = rows[name].loads.get("design") if name in rows else None
+        own = None if row is None else row.built_shape
+        if own is not None and own.stress is not None:
+            rods[name] = _stressed(*own.stress)
+        if own is not None and own.pull is not None:
+            cables[name] = _pulled(*own.pull, force)
+    limits = "100 % breaks them", f"{newtons(force)} are cable.force_max"
+    titles = (
+        "Rods' stress as built under the design load",
+        "Largest cable force as built under the design load",
+    )
     return [
-        Check(
-            title,
-            f"told, in the median of structures; {limit}",
-            {name: own.get(name, UNASKED) for name in designs},
-        )
-        for title, limit, own in (
-            ("Rods' stress as built under the design load", "100 % breaks them", rods),
-            (
-                "Largest cable force as built under the design load",
-                f"{newtons(force)} are cable.force_max",
-                cables,
-            ),
-        )
-        if own
+        Check(title, f"told, in the median of structures; {limit}", cells)
+        for title, limit, cells in zip(titles, limits, (rods, cables), strict=True)
+        if set(cells.values()) != {UNASKED}
     ]
 
 
-def _broken_words(found: str) -> str:
-    return (
+def _stressed(usual: float, worst: float) -> Cell:
+    """The rods' stress as built, over their strength."""
+    found = f"{number(100.0 * usual)} % of the strength, {number(100.0 * worst)} % in the worst"
+    care = (
         f"{found}, which breaks rods. Look first at short ends beside supports, bent where a support is off: "
         "fit supports to where the ends lie, or say in tolerances.supports how near they are set"
     )
+    return Cell(found, None, False, caution=care if worst > 1.0 else "")
 
 
-def _pulled_words(found: str) -> str:
-    return f"{found}, more than cable.force_max. Tension cables by their force, not by their length alone, or take stronger ones"
+def _pulled(usual: float, worst: float, most: float) -> Cell:
+    """The cables' force as built, N, which may be so much at `most`."""
+    found = f"{newtons(usual)}, {newtons(worst)} in the worst"
+    care = f"{found}, more than cable.force_max. Tension cables by their force, not by their length alone, or take stronger ones"
+    return Cell(found, None, False, caution=care if exceeds(worst, most) else "")
 
 
 def _at_most(

@@ -125,13 +125,12 @@ def built_shape_words(own: BuiltShapeRecord) -> str:
 def _strain_words(own: BuiltShapeRecord) -> str:
     """How much rods and cables bear as built; "" of older runs."""
     found = ""
-    if own.stress_utilisation_max and own.stress_utilisation_max_worst:
-        usual, worst = (
-            number(100.0 * x) for x in (own.stress_utilisation_max, own.stress_utilisation_max_worst)
-        )
+    if own.stress is not None:
+        usual, worst = (number(100.0 * each) for each in own.stress)
         found += f", rods at {usual} % of their strength ({worst} % in the worst)"
-    if own.cable_force_max and own.cable_force_max_worst:
-        found += f", a cable at {newtons(own.cable_force_max)} ({newtons(own.cable_force_max_worst)})"
+    if own.pull is not None:
+        usual, worst = map(newtons, own.pull)
+        found += f", a cable at {usual} ({worst})"
     return found
 
 

@@ -85,7 +85,6 @@ def shown_run(run: Run, budget: int = _BUDGET, *, page: Path | None = None) -> S
         settings=(run.folder / "case.toml").read_text(encoding="utf-8"),
         pictures=pictures,
         limit=colour_limit(run),
-        force_max=run.case.cable.force_max,
         notes=[*_notes(run, bool(pictures)), *left],
         files=sorted(
             file.relative_to(run.folder).as_posix()

@@ -14,7 +14,7 @@ import shellform
 from shellform.arrays import Reals, Record
 from shellform.compiled import clock_without_compiling
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.gridshell.layers import rod_stress
+from shellform.gridshell.layers import rod_utilisation
 from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.paths import deviations
 from shellform.records.drawn import DrawnPath, DrawnShape, DrawnSnap, read_drawn, write_drawn
@@ -151,6 +151,6 @@ def _shapes(examined: Examined, outcomes: Sequence[DrawnOutcome]) -> Iterator[Dr
             each.number,
             float(far.max()),
             float(far.mean()),
-            float(rod_stress(section, beams, beams.local_forces(state)).max() / section.material.strength),
+            float(rod_utilisation(section, beams, state).max()),
             float(cables.tension(state).max(initial=0.0)),
         )

@@ -7,7 +7,7 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError
-from shellform.gridshell import candidates
+from shellform.gridshell import candidates, layers
 from shellform.gridshell import gridshell as module
 from shellform.gridshell.gridshell import Gridshell, TooCurved, brace
 from shellform.gridshell.layers import LOCK
@@ -116,7 +116,7 @@ def test_rods_are_used_by_the_larger_stress_of_both_ends_over_their_strength(she
         seen.append(section.radius)
         return np.array([[40e6, 100e6], [60e6, 20e6]])
 
-    monkeypatch.setattr(module, "rod_stress", stress)
+    monkeypatch.setattr(layers, "rod_stress", stress)
     monkeypatch.setattr(module, "rod_bending_stress", stress)
     design, state = sf.Design([1.9, 2.8, 4.7], np.ones(3, dtype=bool), 0.005), at_rest(FLAT)
     assert shell.utilisation(design, state) == pytest.approx([0.5, 0.3])

@@ -397,7 +397,11 @@ def test_cables_alike_change_their_lengths_by_the_same():
 
     def step(slope, low=-1.0, high=1.0, rows=none, values=nothing):
         return proposal._equal_steps(
-            task, width, np.diag([1e-6] * 3), np.array(slope), rows, values, np.full(3, low), np.full(3, high)
+            task,
+            width,
+            proposal.Asked(
+                np.diag([1e-6] * 3), np.array(slope), rows, values, np.full(3, low), np.full(3, high)
+            ),
         )
 
     assert step([-1.0, 1.0, 0.0]) == pytest.approx([0.125, -1.0, 1.0], abs=1e-4)

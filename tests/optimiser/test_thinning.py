@@ -11,7 +11,7 @@ from shellform.optimiser import phases, thinning, trials
 from shellform.optimiser.descent import descend
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.phases import _made_to_stand, _repaired, _thin
-from shellform.optimiser.proposal import _as_far_as_can_be
+from shellform.optimiser.proposal import Asked, _as_far_as_can_be
 from shellform.optimiser.search_state import restiffened, stiffness_of, violation
 from shellform.optimiser.thinning import Budget, farthest
 from shellform.reliability.requirements import Demand, Required
@@ -49,9 +49,7 @@ def test_a_step_that_is_asked_for_more_than_it_can_give_gives_all_that_it_can():
     task = SimpleNamespace(solver=sf.SequentialConvex(), aims=0)
     # u in [-1, 1] falls by the objective; the constraint 1 - u / 2 <= 0 can come down to a half, and the
     # guard of the other variable, 0.3 - v <= 0, to nothing
-    u = _as_far_as_can_be(
-        task,
-        1,
+    asked = Asked(
         np.eye(2),
         np.array([1.0, 1.0]),
         np.array([[-0.5, 0.0], [0.0, -1.0]]),
@@ -59,6 +57,7 @@ def test_a_step_that_is_asked_for_more_than_it_can_give_gives_all_that_it_can():
         -np.ones(2),
         np.ones(2),
     )
+    u = _as_far_as_can_be(task, 1, asked)
     np.testing.assert_allclose(u, [1.0, 0.3], atol=1e-6)
 
 

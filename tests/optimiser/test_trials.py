@@ -300,7 +300,7 @@ def test_a_trial_towards_another_design_lies_on_the_straight_way_to_it(dome):
 
 
 def test_a_trial_towards_another_design_that_leaves_the_branch_is_none(monkeypatch):
-    def leaves(*_):
+    def leaves(*_, **__):
         raise OffBranch
 
     own = Design(np.ones(3), np.ones(3, dtype=bool), 0.01)

@@ -265,7 +265,6 @@ def run_of(shell, vault, design, moved):
         "",
         [],
         0.01,
-        20.0,
         [],
         [],
     )

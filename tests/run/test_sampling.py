@@ -35,7 +35,7 @@ class Bench:
                 stands=number % 5 != 4,
                 snaps=[SimpleNamespace(factor=0.5, far=0.01 * number)] if number % 5 == 4 else [],
                 resting=None if resting is None or number % 3 == 2 else number,
-                beams=SimpleNamespace(local_forces=lambda state: 10.0 * state),
+                beams=SimpleNamespace(share=0.05),
                 cables=SimpleNamespace(tension=lambda state: np.array([0.0, 2.0 * state])),
             )
             for number in numbers
@@ -56,10 +56,9 @@ def draw(monkeypatch, tmp_path):
     monkeypatch.setattr(Examined, "key", lambda *_: "key")
     monkeypatch.setattr(sampling, "deviations", lambda shell, state: np.array([0.0, 0.002, 0.001 * state]))
     monkeypatch.setattr(
-        sampling, "rod_stress", lambda section, beams, forces: np.array([[50.0, forces + section.own]])
+        sampling, "rod_utilisation", lambda rod, beams, state: np.array([0.25, beams.share * state + rod])
     )
-    section = SimpleNamespace(own=100.0, material=SimpleNamespace(strength=200.0))
-    rods = {0.02: SimpleNamespace(section=section)}
+    rods = {0.02: SimpleNamespace(section=0.5)}
     shell = SimpleNamespace(rod=SimpleNamespace(resized=rods.get))
     design = SimpleNamespace(radius=0.02)
     (tmp_path / "designs").mkdir()

@@ -159,11 +159,9 @@ def _slack(main: LoadRecord | None, before: LoadRecord | None) -> str:
 
 def _as_built(shape: BuiltShapeRecord | None) -> str:
     """What the rods of structures as built bear."""
-    if shape is None or not shape.stress_utilisation_max or not shape.stress_utilisation_max_worst:
+    if shape is None or shape.stress is None:
         return ""
-    usual, worst = (
-        100.0 * each for each in (shape.stress_utilisation_max, shape.stress_utilisation_max_worst)
-    )
+    usual, worst = (100.0 * each for each in shape.stress)
     return f" as planned, {usual:.0f} as built, where they are stressed most ({worst:.0f} in the worst structure)"
 
 

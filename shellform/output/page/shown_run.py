@@ -31,7 +31,7 @@ class ShownRun(Record):
     What is shown of it:
     - `title`, and `place`: the folder's name; `notes`: what is missing or to be known.
     - `settings`: the case file's text; `pictures`.
-    - `limit`, m: the end of the colour scale; `force_max`, N: the cables' limit.
+    - `limit`, m: the end of the colour scale.
     - `files` of the run folder, which is reached from the page by the relative address `home` ("": it stands
       in it).
     """
@@ -51,7 +51,6 @@ class ShownRun(Record):
     settings: str
     pictures: Sequence[Picture]
     limit: float
-    force_max: float
     notes: Sequence[str]
     files: Sequence[str]
     home: str = ""
