@@ -112,6 +112,7 @@ def tell_as_built(summary: Summary) -> None:
     to build fails first."""
     from shellform.quantities import number
     from shellform.records.words import (
+        adjusted_words,
         before_load_words,
         built_shape_words,
         cause_title,
@@ -135,6 +136,8 @@ def tell_as_built(summary: Summary) -> None:
                 parts.append(standing_words(own))
             if row.built_shape is not None:
                 parts.append(built_shape_words(row.built_shape))
+            if row.adjusted_shape is not None:
+                parts.append(adjusted_words(row.adjusted_shape))
             if row.expected_stiffness is not None:
                 parts.append(f"softest mode as built {number(row.expected_stiffness)} N/m")
             if parts:

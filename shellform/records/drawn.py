@@ -47,6 +47,15 @@ class DrawnPath:
     snaps: tuple[DrawnSnap, ...] = ()
     shapes: tuple[DrawnShape, ...] = ()
 
+    def and_then(self, more: DrawnPath) -> DrawnPath:
+        """With those that come next."""
+        return DrawnPath(
+            (*self.factors, *more.factors),
+            (*self.stand, *more.stand),
+            (*self.snaps, *more.snaps),
+            (*self.shapes, *more.shapes),
+        )
+
 
 def median_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
     """The median and the largest of the values; None where one of them isn't known."""
@@ -56,10 +65,12 @@ def median_and_worst(values: Sequence[float | None]) -> tuple[float | None, floa
 
 @dataclass(frozen=True)
 class Drawn:
-    """The `paths` of a design's structures by load; `key` is of all that they depend on."""
+    """The `paths` of a design's structures by load, and that of the first of them `adjusted` on site before
+    the design load; `key` is of all that they depend on."""
 
     key: str
     paths: Mapping[str, DrawnPath] = field(default_factory=dict)
+    adjusted: DrawnPath = DrawnPath()
 
     def also(self, load: str, path: DrawnPath) -> Drawn:
         """With this path in place of the load's."""

@@ -160,11 +160,13 @@ def _strained_as_built(rows: Mapping[str, DesignRecord], designs: Sequence[str],
     rods, cables = dict.fromkeys(designs, UNASKED), dict.fromkeys(designs, UNASKED)
     for name in designs:
         row = rows[name].loads.get("design") if name in rows else None
-        own = None if row is None else row.built_shape
-        if own is not None and own.stress is not None:
-            rods[name] = _stressed(*own.stress)
-        if own is not None and own.pull is not None:
-            cables[name] = _pulled(*own.pull, force)
+        if row is None or row.built_shape is None:
+            continue
+        own, then = row.built_shape, row.adjusted_shape
+        if own.stress is not None:
+            rods[name] = _stressed(own.stress, None if then is None else then.stress)
+        if own.pull is not None:
+            cables[name] = _pulled(own.pull, None if then is None else then.pull, force)
     limits = "100 % breaks them", f"{newtons(force)} are cable.force_max"
     titles = (
         "Rods' stress as built under the design load",
@@ -177,21 +179,46 @@ def _strained_as_built(rows: Mapping[str, DesignRecord], designs: Sequence[str],
     ]
 
 
-def _stressed(usual: float, worst: float) -> Cell:
-    """The rods' stress as built, over their strength."""
-    found = f"{number(100.0 * usual)} % of the strength, {number(100.0 * worst)} % in the worst"
+def _stressed(own: tuple[float, float], then: tuple[float, float] | None) -> Cell:
+    """The rods' stress as built over their strength, the median and the worst, and `then`, adjusted on
+    site."""
+
+    def words(stress: tuple[float, float]) -> str:
+        usual, worst = (number(100.0 * each) for each in stress)
+        return f"{usual} % of the strength, {worst} % in the worst"
+
+    found = words(own)
     care = (
-        f"{found}, which breaks rods. Look first at short ends beside supports, bent where a support is off: "
-        "fit supports to where the ends lie, or say in tolerances.supports how near they are set"
+        f"{found}, which breaks rods. Fasten rods' ends at their supports last, where they lie, and tighten "
+        "cables to their force before any load"
     )
-    return Cell(found, None, False, caution=care if worst > 1.0 else "")
+    if then is not None:
+        found += f"; adjusted on site {words(then)}"
+        care += f": then {words(then)}"
+        if then[1] > 1.0:
+            care += ". Where a rod bows out between two crossings, loosen it beside them and clamp it anew"
+    return Cell(found, None, False, caution=care if own[1] > 1.0 else "")
 
 
-def _pulled(usual: float, worst: float, most: float) -> Cell:
-    """The cables' force as built, N, which may be so much at `most`."""
-    found = f"{newtons(usual)}, {newtons(worst)} in the worst"
-    care = f"{found}, more than cable.force_max. Tension cables by their force, not by their length alone, or take stronger ones"
-    return Cell(found, None, False, caution=care if exceeds(worst, most) else "")
+def _pulled(own: tuple[float, float], then: tuple[float, float] | None, most: float) -> Cell:
+    """The cables' force as built, N, the median and the worst, and `then`, adjusted on site, which may be so
+    much at `most`."""
+
+    def words(pull: tuple[float, float]) -> str:
+        usual, worst = map(newtons, pull)
+        return f"{usual}, {worst} in the worst"
+
+    found = words(own)
+    care = (
+        f"{found}, more than the {newtons(most)} of cable.force_max. Tighten cables to their force before any "
+        "load, not to their length alone"
+    )
+    if then is not None:
+        found += f"; adjusted on site {words(then)}"
+        care += f": then {words(then)}"
+        if exceeds(then[1], most):
+            care += ". For more than that take stronger cables"
+    return Cell(found, None, False, caution=care if exceeds(own[1], most) else "")
 
 
 def _at_most(

@@ -117,7 +117,8 @@ class LoadRecord:
     ("none": it doesn't up to `critical_sought`, the most that was tried), `critical_factor_halved` the same
     with rod elements halved, and `critical_factor_error` what the coarser mesh is off by, as are
     `deviation_max_error`, `deviation_mean_error`, m, and `rod_utilisation_error`. `slack`: cables without
-    tension, by name; `stands` and, under the design load, `built_shape`: as built; `expected_stiffness`, N/m:
+    tension, by name; `stands` and, under the design load, `built_shape`: as built; `adjusted_shape`: the same
+    structures of the design to build adjusted on site (reliability/adjusting.py); `expected_stiffness`, N/m:
     the least of the softest mode on the path to this load, cables counted for what they are worth under their
     errors."""
 
@@ -148,6 +149,7 @@ class LoadRecord:
     slack: tuple[str, ...] | None = None
     stands: StandingRecord | None = None
     built_shape: BuiltShapeRecord | None = None
+    adjusted_shape: BuiltShapeRecord | None = None
     expected_stiffness: float | None = None
     multiple: bool = True
 
@@ -180,6 +182,7 @@ class LoadRecord:
             rod_utilisation_error=None,
             stands=None,
             built_shape=None,
+            adjusted_shape=None,
             expected_stiffness=None,
         )
 

@@ -22,16 +22,14 @@ from shellform.case.case import Case
 from shellform.case.entries import StockRodEntry
 from shellform.errors import NotConverged
 from shellform.records.as_built import falls, keeps_factor
-from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.checks import BUILT
-from shellform.records.drawn import DrawnPath, median_and_worst, take_drawn
+from shellform.records.drawn import DrawnPath, take_drawn
 from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.progress import Event, Kind
 from shellform.records.summary import DesignRecord, LoadRecord, StandingRecord, Summary, write_summary
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, open_checks, to_build
 from shellform.reliability.failure import explained
-from shellform.reliability.first_order import moved_by_cause
 from shellform.reliability.guide import guide
 from shellform.reliability.path_of_one import SOUGHT
 from shellform.reliability.perfect import perfect
@@ -46,6 +44,7 @@ from shellform.run.pace import time_words
 from shellform.run.raised import raised
 from shellform.run.rare_failures import rare_of
 from shellform.run.sampling import LOOKED_AT, Clock, Examined, drawn_of
+from shellform.run.shape_as_built import adjusted_shape, built_shape
 from shellform.run.thicker import rods_that_stand
 from shellform.run.workspace import Workspace
 from shellform.structure.elements.threads import side_by_side
@@ -105,6 +104,7 @@ def examine(workspace: Workspace) -> Summary:
             summary = _raised(workspace, _of_run(run, best), summary, clock)
     chosen = _of_run(run, best)
     if best != "unbraced":
+        summary = _adjusted(workspace, chosen, summary)
         summary = replace(summary, failure=_failure(workspace, chosen, entry.drawn))
         if entry.rare:
             summary = replace(summary, rare=_rare(workspace, chosen))
@@ -228,12 +228,26 @@ def _stand(workspace: Workspace, each: Examined, count: int, summary: Summary, c
         for name, share in shares.items():
             own = replace(rows[name], stands=_standing(path, share, workspace.case))
             if name == "design" and (before is None or before.drawn < LOOKED_AT):
-                own = replace(own, built_shape=_built_shape(path, each, entry.seed))
+                own = replace(own, built_shape=built_shape(path, each, entry.seed))
             rows[name] = replace(own, expected_stiffness=guided.get(name, own.expected_stiffness))
     record = replace(summary.designs[each.name], loads=rows)
     summary = summary.with_design(each.name, record)
     write_summary(workspace.folder, summary)
     return summary
+
+
+def _adjusted(workspace: Workspace, each: Examined, summary: Summary) -> Summary:
+    """With what the design's first structures come to under the design load when they are adjusted on site;
+    unchanged where none was looked at."""
+    record = summary.designs[each.name]
+    row = record.loads["design"]
+    if row.built_shape is None or not each.tolerances.causes:
+        return summary
+    workspace.say("safety", f"the {each.name} design adjusted on site", Kind.BEGAN)
+    entry = workspace.case.safety
+    shape = adjusted_shape(workspace.folder, each, entry.drawn, entry.seed)
+    own = replace(record, loads={**record.loads, "design": replace(row, adjusted_shape=shape)})
+    return summary.with_design(each.name, own)
 
 
 def _drawn(workspace: Workspace, each: Examined, load: str, count: int, clock: Clock) -> DrawnPath | None:
@@ -298,24 +312,6 @@ def _standing(path: DrawnPath, share: float, case: Case) -> StandingRecord:
         min(fallen.values(), default=share) / share,
         len(snaps),
         max((own.far for own in path.snaps if own.number in snaps and own.factor < share), default=0.0),
-    )
-
-
-def _built_shape(path: DrawnPath, each: Examined, seed: int) -> BuiltShapeRecord | None:
-    """The shape under the design load of those structures that were looked at and rest under it."""
-    if not path.shapes:
-        return None
-    largest = [each.deviation_max for each in path.shapes]
-    means = [each.deviation_mean for each in path.shapes]
-    nominal = each.nominal("design")
-    return BuiltShapeRecord(
-        len(largest),
-        float(np.median(largest)),
-        max(largest),
-        float(np.median(means)),
-        moved_by_cause(nominal, each.tolerances, seed=seed),
-        *median_and_worst([each.stress_utilisation_max for each in path.shapes]),
-        *median_and_worst([each.cable_force_max for each in path.shapes]),
     )
 
 

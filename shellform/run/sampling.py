@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +18,13 @@ from shellform.gridshell.layers import rod_utilisation
 from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.paths import deviations
 from shellform.records.drawn import DrawnPath, DrawnShape, DrawnSnap, read_drawn, write_drawn
+from shellform.reliability.adjusting import adjusted
+from shellform.reliability.drawing import draw_errors
 from shellform.reliability.path_of_one import DrawnOutcome
 from shellform.reliability.perfect import TO_ITS_END, Perfect, perfect
 from shellform.reliability.safety import paths
 from shellform.reliability.standing import Workshop
+from shellform.structure.elements.threads import side_by_side
 
 _AT_ONCE = 10  # structures, before they are kept
 LOOKED_AT = 20  # structures of which the shape is looked at: each takes some factorisations more
@@ -118,15 +121,7 @@ def drawn_of(
             marks=tuple(own.values()),
             resting=own.get("design") if first < LOOKED_AT else None,
         )
-        path = DrawnPath(
-            (*path.factors, *(each.factor for each in some)),
-            (*path.stand, *(each.stands for each in some)),
-            (
-                *path.snaps,
-                *(DrawnSnap(each.number, snap.factor, snap.far) for each in some for snap in each.snaps),
-            ),
-            (*path.shapes, *_shapes(examined, some)),
-        )
+        path = path.and_then(_path(examined, some))
         kept = kept.also(load, path)
         write_drawn(folder, examined.name, kept)
         clock.took(len(some), clock_without_compiling() - began)
@@ -136,6 +131,37 @@ def drawn_of(
         path.stand[:count],
         tuple(each for each in path.snaps if each.number < count),
         tuple(each for each in path.shapes if each.number < count),
+    )
+
+
+def adjusted_of(folder: Path, examined: Examined, *, count: int, seed: int) -> DrawnPath:
+    """The first `count` structures of the design, adjusted on site and then loaded along the path on which
+    the design load lies; those in the folder are taken from there. Raises NotConverged where the perfect
+    structure has no unloaded equilibrium."""
+    kept = read_drawn(folder, examined.name, examined.key(seed))
+    if len(kept.adjusted.factors) == count:
+        return kept.adjusted
+    load, own = next((load, own) for load, own in paths(examined.loads).items() if "design" in own)
+    workshop = Workshop(examined.nominal(load))
+
+    def one(number: int) -> DrawnOutcome:
+        errors = draw_errors(workshop.nominal.members, examined.tolerances, seed, number)
+        return workshop.load(
+            adjusted(workshop, errors), number=number, marks=tuple(own.values()), resting=own["design"]
+        )
+
+    path = _path(examined, side_by_side(one, list(range(count))))
+    write_drawn(folder, examined.name, replace(kept, adjusted=path))
+    return path
+
+
+def _path(examined: Examined, outcomes: Sequence[DrawnOutcome]) -> DrawnPath:
+    """What is kept of structures, the first ones of a design."""
+    return DrawnPath(
+        tuple(each.factor for each in outcomes),
+        tuple(each.stands for each in outcomes),
+        tuple(DrawnSnap(each.number, snap.factor, snap.far) for each in outcomes for snap in each.snaps),
+        tuple(_shapes(examined, outcomes)),
     )
 
 

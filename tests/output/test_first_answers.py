@@ -174,6 +174,25 @@ def test_how_far_off_is_told_in_millimetres_and_is_bad_where_the_shell_does_not_
     assert told.detail.endswith(
         "of 31 drawn structures; the worst is 79 mm off. Braced and not yet loaded it is 195 mm off at most. A note"
     )
+    then = SimpleNamespace(deviation_max=0.021, deviation_max_worst=0.0491)
+    told = first_answers._how_far(replace(main, built_shape=shape, adjusted_shape=then), None, [])
+    assert told.detail.endswith(
+        "the worst is 79 mm off. With rods' ends fastened last, where they lie, and cables tightened to their force "
+        "before any load it is 21 mm (49 mm in the worst)"
+    )
+
+
+def test_what_rods_bear_is_told_as_built_and_adjusted_on_site():
+    def shape(*stress):
+        return SimpleNamespace(stress=stress or None)
+
+    told = " as planned, 152 as built, where they are stressed most (322 in the worst structure)"
+    assert first_answers._as_built(shape(1.52, 3.22), None) == told
+    assert first_answers._as_built(shape(1.52, 3.22), shape()) == told
+    assert (
+        first_answers._as_built(shape(1.52, 3.22), shape(0.6, 0.999)) == f"{told}, 60 adjusted on site (100)"
+    )
+    assert first_answers._as_built(None, None) == first_answers._as_built(shape(), shape(0.6, 0.9)) == ""
 
 
 def test_slack_cables_are_named_up_to_eight_and_the_others_counted():

@@ -19,7 +19,7 @@ from shellform.gridshell.layers import TwoLayers
 from shellform.gridshell.reactions import reactions
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import nesting, schedules
-from shellform.output.workshop.cable_forces import force_notes
+from shellform.output.workshop.cable_forces import force_notes, tightening_notes
 from shellform.output.workshop.directions import edge_away, rods_away
 from shellform.output.workshop.setting_out import elevations, support_plan
 from shellform.site.measurements import read_places
@@ -235,9 +235,16 @@ def test_the_cable_schedule_tells_the_largest_force_at_each_stage_and_what_is_ab
     assert force_notes({"erected": np.zeros(0)}, "erected", 20.0) == (), "no cables"
 
 
+def test_cables_are_to_be_tightened_to_their_force_where_one_pulls_before_any_load():
+    (told,) = tightening_notes(np.array([0.0, 3.0]))
+    assert told.startswith("Tighten a cable to its force before any load")
+    assert tightening_notes(np.zeros(2)) == tightening_notes(np.zeros(0)) == ()
+
+
 def test_the_cable_schedule_of_a_design_has_these_notes(built):
     notes = schedules.cables(replace(built, force_limit=1e-3)).notes
     assert any(note.startswith("More than that: C") for note in notes)
+    assert any(note.startswith("Tighten a cable to its force") for note in notes)
 
 
 def test_cables_are_tightened_from_the_supports_to_the_crown(read, built):
@@ -558,10 +565,11 @@ def test_supports_lead_along_the_tangents_of_rods_and_of_edge_beams_at_their_fee
     assert table.columns[9:] == tuple(
         f"{name}: on the support along {axis} [N]" for name in ("erected", "design") for axis in "xyz"
     )
-    assert table.notes[3] == "From these directions rods turn in their supports: erected up to 0.0° (S1)."
-    assert "nearer than 30 mm" in table.notes[4]
-    assert table.notes[4].endswith("clash: S0 and S1, 12.5 mm, S1 and S2, 20.0 mm.")
-    assert table.notes[5:] == ("from there",)
+    assert table.notes[2].startswith("Fasten a rod's end to its support last, where it lies along its axis")
+    assert table.notes[4] == "From these directions rods turn in their supports: erected up to 0.0° (S1)."
+    assert "nearer than 30 mm" in table.notes[5]
+    assert table.notes[5].endswith("clash: S0 and S1, 12.5 mm, S1 and S2, 20.0 mm.")
+    assert table.notes[6:] == ("from there",)
 
 
 def test_an_edge_beam_s_first_foot_leads_along_the_beam(monkeypatch):
@@ -597,7 +605,7 @@ def test_an_edge_beam_s_first_foot_leads_along_the_beam(monkeypatch):
         1.0,
         1.0,
     )
-    assert table.notes[3].endswith("clash: none.")
+    assert table.notes[4].endswith("clash: none.")
 
 
 @pytest.mark.parametrize("density", [460.0, 0.0])

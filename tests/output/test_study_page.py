@@ -140,6 +140,8 @@ def test_columns_are_told_in_units_that_a_designer_uses():
     )
     assert planned.words.startswith("largest distance from the target under")
     assert built == replace(planned, words=planned.words.replace("target", "target as built"))
+    adjusted = summary_measure("designs.best.loads.design.adjusted_shape.deviation_max").words
+    assert adjusted == planned.words.replace("target", "target adjusted on site")
     unknown = summary_measure("net.something_new")
     assert (unknown.words, unknown.unit, unknown.factor) == ("net.something_new", "", 1.0)
 

@@ -19,6 +19,7 @@ from shellform.records.summary import StandingRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, headline, to_build, verdict
 from shellform.records.words import (
+    adjusted_words,
     before_load_words,
     built_shape_words,
     critical_words,
@@ -442,9 +443,11 @@ def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_b
         "Largest cable force as built under the design load",
     )
 
-    def made(stress, pull):
-        shape = BuiltShapeRecord(20, 0.003, 0.004, 0.001, {}, stress[0], stress[1], pull[0], pull[1])
-        return found(shell, designs, "design", built_shape=shape)
+    def shape(stress, pull):
+        return BuiltShapeRecord(20, 0.003, 0.004, 0.001, {}, stress[0], stress[1], pull[0], pull[1])
+
+    def made(stress, pull, then=None):
+        return found(shell, designs, "design", built_shape=shape(stress, pull), adjusted_shape=then)
 
     own = made((0.9, 0.999), (18.0, 20.0))
     assert (own[rods].found, own[rods].asked) == ("90 % of the strength, 99.9 % in the worst", False)
@@ -452,8 +455,23 @@ def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_b
     assert own[rods].caution == own[cables].caution == ""
     own = made((1.06, 1.3), (18.0, 26.0))
     assert own[rods].caution.startswith("106 % of the strength, 130 % in the worst, which breaks rods")
-    assert own[cables].caution.startswith("18 N, 26 N in the worst, more than cable.force_max")
+    assert own[rods].caution.endswith("tighten cables to their force before any load"), (
+        "what then isn't known"
+    )
+    assert own[cables].caution.startswith("18 N, 26 N in the worst, more than the 20 N of cable.force_max")
     assert verdict_of(own).cautions[0].startswith(f"{rods}: 106 % of the strength")
+    then = made((1.06, 1.3), (18.0, 26.0), shape((0.61, 1.0), (17.0, 20.0)))
+    assert then[rods].found == (
+        "106 % of the strength, 130 % in the worst; adjusted on site 61 % of the strength, 100 % in the worst"
+    )
+    assert then[rods].caution.endswith("any load: then 61 % of the strength, 100 % in the worst")
+    assert then[cables].found == "18 N, 26 N in the worst; adjusted on site 17 N, 20 N in the worst"
+    assert then[cables].caution.endswith("not to their length alone: then 17 N, 20 N in the worst")
+    then = made((1.06, 1.3), (18.0, 26.0), shape((0.61, 1.01), (17.0, 20.5)))
+    assert "loosen it beside them" in then[rods].caution
+    assert then[cables].caution.endswith("20.5 N in the worst. For more than that take stronger cables")
+    then = made((0.9, 0.999), (18.0, 20.0), shape((0.61, 1.01), (17.0, 20.5)))
+    assert then[rods].caution == then[cables].caution == "", "as built it holds without"
     for nothing in ((None, None), (0.0, 0.0)):
         assert not {rods, cables} & made(nothing, nothing).keys(), "not known, or no cables"
 
@@ -602,6 +620,10 @@ def test_words_of_the_shape_as_built_name_what_drives_it():
     assert built_shape_words(strained).endswith(", rods at 108 % of their strength (129 % in the worst)")
     pulled = replace(shape, cable_force_max=18.04, cable_force_max_worst=26.0)
     assert built_shape_words(pulled).endswith(", a cable at 18 N (26 N)")
+    assert (
+        adjusted_words(pulled)
+        == "adjusted on site 53 mm off at most, 67 mm in the worst, a cable at 18 N (26 N)"
+    )
 
 
 def test_what_fewer_cables_cost_of_the_shape_as_built_is_told_from_a_quarter_on_with_what_keeps_it():

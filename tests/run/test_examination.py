@@ -15,16 +15,19 @@ from shellform.gridshell.tolerances import SOURCES, default_tolerances
 from shellform.records.drawn import DrawnPath, DrawnSnap, read_drawn
 from shellform.records.progress import Kind
 from shellform.records.summary import read_summary, write_summary
+from shellform.reliability.adjusting import adjusted
+from shellform.reliability.drawing import draw_errors
 from shellform.reliability.perfect import perfect
 from shellform.reliability.probability import counted
 from shellform.reliability.safety import paths
 from shellform.reliability.standing import Workshop, sample
-from shellform.run import examination, optimising
+from shellform.run import examination, optimising, sampling
 from shellform.run.examination import _standing
 from shellform.run.folder import read_run
 from shellform.run.judged import run_checks
 from shellform.run.run import run_case
 from shellform.run.sampling import Examined
+from shellform.run.shape_as_built import adjusted_shape
 from tests.stubs import CASE
 
 FEW = ["safety.drawn=12", "safety.compared=4", "safety.probability_design=0.9", "optimise.unloaded=false"]
@@ -158,6 +161,29 @@ def test_of_the_shape_as_built_the_median_the_worst_and_what_drives_it_are_told(
         )
         assert told.deviation_max > design.loads["design"].deviation_max
         assert set(told.causes) == set(tolerances.causes)
+
+
+def test_of_the_design_to_build_the_same_structures_are_told_adjusted_on_site(whole, monkeypatch):
+    run = read_run(whole[0])
+    best = run.summary.verdict.design
+    for name, design in run.summary.designs.items():
+        assert (design.loads["design"].adjusted_shape is None) == (name != best)
+    shell, tolerances = run.shell_of(best), case_tolerances(run.case, run.shell_of(best))
+    each = Examined(best, shell, run.designs[best], run.loads, tolerances)
+    ((largest, own),) = paths(run.loads).items()
+    workshop = Workshop(each.nominal(largest))
+    far = []
+    for number in range(12):
+        errors = adjusted(workshop, draw_errors(workshop.nominal.members, tolerances, 0, number))
+        rest = workshop.load(errors, number=number, resting=own["design"]).resting
+        far.append(np.linalg.norm(rest.positions - shell.target.positions, axis=1).max())
+    told = run.summary.designs[best].loads["design"].adjusted_shape
+    assert told.structures == 12, "as many as were drawn"
+    assert told.deviation_max_worst == pytest.approx(max(far), abs=1e-8)
+    assert told.deviation_max == pytest.approx(np.median(far), abs=1e-8)
+    assert told.causes == {}, "what drives it is told of those that weren't"
+    monkeypatch.setattr(sampling, "Workshop", None)
+    assert adjusted_shape(whole[0], each, 12, 0) == told, "kept"
 
 
 def test_a_limit_on_the_shape_as_built_is_judged_by_the_worst_structure(file, whole):

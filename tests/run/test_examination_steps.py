@@ -14,7 +14,7 @@ from shellform.records.drawn import DrawnPath, DrawnShape, DrawnSnap
 from shellform.records.progress import Kind
 from shellform.records.summary import StandingRecord
 from shellform.reliability.path_of_one import SOUGHT
-from shellform.run import examination
+from shellform.run import examination, shape_as_built
 from shellform.run.sampling import Clock, Examined
 from tests.records.made import design, load, summary
 
@@ -233,7 +233,7 @@ def test_structures_are_drawn_where_fewer_were_before_or_under_another_seed(
 
     monkeypatch.setattr(examination, "_drawn", drawn)
     monkeypatch.setattr(examination, "_guided", guide)
-    monkeypatch.setattr(examination, "_built_shape", lambda path, each, seed: shape)
+    monkeypatch.setattr(examination, "built_shape", lambda path, each, seed: shape)
     given = told()
     rows = dict(given.designs["initial"].loads)
     rows["additional"] = replace(rows["additional"], stands=before, expected_stiffness=3.0)
@@ -281,24 +281,24 @@ def test_of_the_shapes_as_built_medians_and_the_worst_are_told(monkeypatch):
         assert nominal == "nominal under design"
         return {"marks": 0.001 * seed}
 
-    monkeypatch.setattr(examination, "moved_by_cause", moved)
+    monkeypatch.setattr(shape_as_built, "moved_by_cause", moved)
     shapes = tuple(
         DrawnShape(number, most, mean)
         for number, most, mean in ((0, 0.05, 0.02), (1, 0.09, 0.01), (2, 0.04, 0.03), (4, 0.06, 0.015))
     )
     path = replace(PATH, shapes=shapes)
-    assert examination._built_shape(path, examined(), 7) == BuiltShapeRecord(
+    assert shape_as_built.built_shape(path, examined(), 7) == BuiltShapeRecord(
         4, pytest.approx(0.055), 0.09, pytest.approx(0.0175), {"marks": 0.007}
     )
-    assert examination._built_shape(PATH, examined(), 7) is None
+    assert shape_as_built.built_shape(PATH, examined(), 7) is None
     strained = tuple(
         replace(each, stress_utilisation_max=share, cable_force_max=50.0 * share)
         for each, share in zip(shapes, (1.1, 0.8, 1.6, 1.2), strict=True)
     )
-    found = examination._built_shape(replace(path, shapes=strained), examined(), 7)
+    found = shape_as_built.built_shape(replace(path, shapes=strained), examined(), 7)
     assert (found.stress_utilisation_max, found.stress_utilisation_max_worst) == (pytest.approx(1.15), 1.6)
     assert (found.cable_force_max, found.cable_force_max_worst) == (pytest.approx(57.5), pytest.approx(80.0))
-    mixed = examination._built_shape(replace(path, shapes=(shapes[0], *strained[1:])), examined(), 7)
+    mixed = shape_as_built.built_shape(replace(path, shapes=(shapes[0], *strained[1:])), examined(), 7)
     assert mixed.stress_utilisation_max is None, "some were looked at by a version that didn't tell it"
 
 

@@ -89,7 +89,7 @@ def answers(
     stressed = (
         ""
         if main is None or not math.isfinite(shell.rod.strength)
-        else f"; at {100 * main.stressed:.0f} % of their strength{_as_built(main.built_shape)}"
+        else f"; at {100 * main.stressed:.0f} % of their strength{_as_built(main.built_shape, main.adjusted_shape)}"
     )
     locked = "" if layers_of(section) == 1 else "; bent lath by lath, then locked by shear blocks"
     found.append(
@@ -157,12 +157,16 @@ def _slack(main: LoadRecord | None, before: LoadRecord | None) -> str:
     return "".join(found) or ("; none slack before the load" if none else "")
 
 
-def _as_built(shape: BuiltShapeRecord | None) -> str:
-    """What the rods of structures as built bear."""
+def _as_built(shape: BuiltShapeRecord | None, then: BuiltShapeRecord | None) -> str:
+    """What the rods of structures as built bear, and `then`, adjusted on site."""
     if shape is None or shape.stress is None:
         return ""
     usual, worst = (100.0 * each for each in shape.stress)
-    return f" as planned, {usual:.0f} as built, where they are stressed most ({worst:.0f} in the worst structure)"
+    told = f" as planned, {usual:.0f} as built, where they are stressed most ({worst:.0f} in the worst structure)"
+    if then is None or then.stress is None:
+        return told
+    usual, worst = (100.0 * each for each in then.stress)
+    return f"{told}, {usual:.0f} adjusted on site ({worst:.0f})"
 
 
 def _stands_on(net: Net, more: LoadRecord | None, loads: Mapping[str, LoadRecord]) -> Answer:
@@ -194,12 +198,23 @@ def _how_far(main: LoadRecord, before: LoadRecord | None, notes: Sequence[str]) 
     drawn = (
         f"at most, under the design load; {mean} and {_mm(built.deviation_mean)} in the mean. As built is the median of "
         f"{built.structures} drawn structures; the worst is {_mm(built.deviation_max_worst)} off{driven_words(built)}"
+        f"{_on_site(main.adjusted_shape)}"
     )
     return Answer(
         question,
         f"{planned} as planned, {_mm(built.deviation_max)} as built",
         ". ".join([drawn, *notes]),
         good,
+    )
+
+
+def _on_site(then: BuiltShapeRecord | None) -> str:
+    """How far off the same structures are when they have been adjusted."""
+    if then is None:
+        return ""
+    return (
+        ". With rods' ends fastened last, where they lie, and cables tightened to their force before any load it is "
+        f"{_mm(then.deviation_max)} ({_mm(then.deviation_max_worst)} in the worst)"
     )
 
 

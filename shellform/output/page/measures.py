@@ -107,7 +107,9 @@ def summary_measure(path: str) -> Measure:
         else f" of the {'design to build' if design == 'best' else design_title(design).lower() + ' design'}"
     )
     under = "" if load is None else f" under {load_title(load)}"
-    built = " as built" if way[-1:] == ["built_shape"] else ""
+    built = {"built_shape": " as built", "adjusted_shape": " adjusted on site"}.get(
+        way[-1] if way else "", ""
+    )
     return Measure(f"{known.words}{built}{under}{of}", known.unit, known.factor)
 
 

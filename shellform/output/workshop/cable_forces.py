@@ -35,3 +35,14 @@ def force_notes(pulls: Mapping[str, Reals], before: str, limit: float | None) ->
     if slack:
         told.append(f"Slack before any load: {listed([f'C{k}' for k in slack])}.")
     return tuple(told)
+
+
+def tightening_notes(before: Reals) -> tuple[str, ...]:
+    """By what cables are tightened that pull `before` (c,), N, any load, a sentence; nothing where none
+    does."""
+    if not (before > 0.0).any():
+        return ()
+    return (
+        "Tighten a cable to its force before any load, by its rest length only where it hangs slack then: lengths alone "
+        "leave in it what supports and marks are off.",
+    )

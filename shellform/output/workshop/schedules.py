@@ -41,7 +41,7 @@ from shellform.gridshell.grouping import cut_lengths
 from shellform.gridshell.layers import layers_of
 from shellform.net.grid import Grid, rod_names
 from shellform.output.workshop.block_schedule import block_table
-from shellform.output.workshop.cable_forces import force_notes
+from shellform.output.workshop.cable_forces import force_notes, tightening_notes
 from shellform.output.workshop.directions import away, turning_note
 from shellform.output.workshop.edge_schedule import bundled_note, edge_table
 from shellform.output.workshop.nesting import Cutting
@@ -248,6 +248,7 @@ def cables(built: Built) -> Table:
         f"Lengths between the pins' axes. {how_many(len(pairs), 'cable', 'cables')}, EA = {newtons(shell.cable.stiffness, 6)}. A force of "
         "0: slack at that stage.",
         *force_notes(pulls, _stage("none"), built.force_limit),
+        *tightening_notes(pulls[_stage("none")]),
         *cutting_of_cables(built),
         *turnbuckles_of_cables(built),
     )
@@ -318,6 +319,7 @@ def supports(built: Built) -> Table:
         "x, y and z are those of the axis that ends there, a rod's or an edge beam's, not of the ground under it.",
         "Supports stand where they are: before, during and after the pour. Forces are those of the rods' ends on them, "
         "at the feet of edge beams (E0, E1, …) those of the beams, with the load that stands on the support itself.",
+        "Fasten a rod's end to its support last, where it lies along its axis: a rod that is pushed by the little that a support is off bows out.",
         "Bearing, from x towards y, and rise are those of the axis' tangent at the support in the wanted shape; of beams that meet "
         "in one, the first one's.",
         *turning_note(net, _told_states(built)),
