@@ -3,6 +3,7 @@ no process waits for another."""
 
 import os
 import subprocess
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,6 +11,7 @@ import pytest
 
 from tests.conftest import pytest_collection_modifyitems
 
+AHEAD = "shellform.structure.ahead"
 SETUP = Path(__file__).parent.parent / "scripts/setup"
 # In place of a virtual environment's Python: notes what it is asked for, and lets the locked install fail as
 # told.
@@ -36,13 +38,14 @@ def set_up(tmp_path):
             text=True,
             check=False,
         )
-        return done, calls.read_text(encoding="utf-8").splitlines()
+        told = calls.read_text(encoding="utf-8").splitlines()
+        return done, [line for line in told if AHEAD not in line]  # which it doesn't wait for
 
     return run
 
 
 def test_users_get_what_is_locked_without_tests_and_mkl_and_only_once(set_up):
-    done, (locked, package) = set_up("all")
+    done, (_, locked, package) = set_up("all")
     assert done.stdout == "ready\n"
     assert "--require-hashes" in locked
     assert [word.rpartition("/")[2] for word in locked.split() if word.endswith(".txt")] == ["all.txt"]
@@ -51,10 +54,31 @@ def test_users_get_what_is_locked_without_tests_and_mkl_and_only_once(set_up):
     assert set_up("all")[1] == []
 
 
+def test_what_beams_need_is_installed_first_and_compiles_their_loops_meanwhile(set_up, tmp_path):
+    kept = tmp_path / "kept"
+    (tmp_path / "venv/bin/python").write_text(
+        f'#!/usr/bin/env bash\necho "$*" >> {kept}\n'
+        'for each; do case $each in /tmp/*) grep -oE "^[a-z]+" "$each" >> ' + f"{kept}.names ;; esac; done\n",
+        encoding="utf-8",
+    )
+    done, _ = set_up("all")
+    assert done.stdout == "ready\n"
+    until = time.monotonic() + 20.0
+    while AHEAD not in kept.read_text(encoding="utf-8") and time.monotonic() < until:
+        time.sleep(0.05)
+    first, *others = kept.read_text(encoding="utf-8").splitlines()
+    assert "--require-hashes" in first
+    assert "--no-deps" in first
+    (ahead,) = [line for line in others if AHEAD in line]
+    assert int(ahead.split()[-1]) > 1, "the set-up's own number, with which it ends"
+    names = set((tmp_path / "kept.names").read_text(encoding="utf-8").split())
+    assert names == {"cvxopt", "llvmlite", "numba", "numpy", "scipy"}
+
+
 def test_the_tests_set_up_serves_users_too_and_announces_the_licence_of_mkl(set_up):
     done, calls = set_up("all,mkl,docs,test")
     assert "proprietary" in done.stderr
-    assert len(calls) == 2
+    assert len(calls) == 3
     assert set_up("all")[1] == []
 
 
@@ -62,7 +86,7 @@ def test_a_file_that_is_not_the_locked_one_ends_the_set_up(set_up):
     done, calls = set_up("all", "THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE.")
     assert done.returncode == 2
     assert "DO NOT MATCH" in done.stderr
-    assert len(calls) == 1
+    assert len(calls) == 2
 
 
 def test_where_the_lock_does_not_fit_the_bounds_are_installed_and_that_is_said(set_up):

@@ -1,4 +1,5 @@
-"""Compiles the longest element loops in a process of its own, while another makes a surface and its net.
+"""Compiles the longest element loops in a process of its own, while another makes a surface and its net or
+installs what else they need.
 
 On a machine where nothing is compiled yet those of the beams' third derivatives take half of the time, and
 are needed last.
@@ -48,7 +49,7 @@ def compiling_ahead() -> Iterator[None]:
 
 def compile_loops() -> None:
     """Compiles what is in no cache yet: a rod of two elements with a cable tells how its stiffness changes,
-    and comes to rest."""
+    comes to rest, and tells its forces' derivatives and where a motion leads."""
     places = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [1.0, 0.0, 0.0]])
     one = np.ones(2)
     rod = make_beams(places, np.array([[0, 1], [1, 2]]), axial=one, torsion=one, bending_y=one, bending_z=one)
@@ -60,7 +61,9 @@ def compile_loops() -> None:
     load[2, 2] = 0.01
     shape = np.ones((18, 1))
     bilinear_by_dof(assembly, at_rest(places), shape, shape)  # first, while the other process needs the rest
-    find_equilibrium(assembly, at_rest(places), load)
+    rest = find_equilibrium(assembly, at_rest(places), load).state
+    rod.local_forces_by_dof(rest)
+    rod.foreseen(rest, load)
 
 
 if __name__ == "__main__":

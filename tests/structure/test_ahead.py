@@ -7,7 +7,8 @@ import pytest
 from scripts.gridshell_models import gridshell
 from shellform.structure import ahead
 from shellform.structure.answers.third_derivatives import bilinear_by_dof
-from shellform.structure.elements.beam_kernels import evaluate
+from shellform.structure.elements.beam_foreseen import foreseen
+from shellform.structure.elements.beam_kernels import evaluate, local_by_dof
 from shellform.structure.elements.beam_thirds import contracted
 from shellform.structure.elements.state import at_rest
 from shellform.structure.network import assemble
@@ -16,14 +17,18 @@ from shellform.structure.solve.equilibrium import find_equilibrium
 
 def test_a_gridshell_needs_no_other_loops_over_beams_than_those_that_are_compiled_ahead():
     ahead.compile_loops()
-    known = [list(each.signatures) for each in (evaluate, contracted)]
+    loops = evaluate, contracted, local_by_dof, foreseen
+    known = [list(each.signatures) for each in loops]
     assert all(known)
     model = gridshell(3)
     assembly = assemble(model.network)
     rest = find_equilibrium(assembly, at_rest(model.network.nodes), model.loads["design"]).state
     shape = np.ones((6 * assembly.count, 1))
     bilinear_by_dof(assembly, rest, shape, shape)
-    assert [list(each.signatures) for each in (evaluate, contracted)] == known
+    (beams,) = assembly.beams
+    beams.local_forces_by_dof(rest)
+    beams.foreseen(rest, np.zeros((assembly.count, 6)))
+    assert [list(each.signatures) for each in loops] == known
 
 
 @pytest.fixture
