@@ -565,7 +565,7 @@ def test_supports_lead_along_the_tangents_of_rods_and_of_edge_beams_at_their_fee
     assert table.columns[9:] == tuple(
         f"{name}: on the support along {axis} [N]" for name in ("erected", "design") for axis in "xyz"
     )
-    assert table.notes[2].startswith("Fasten a rod's end to its support last, where it lies along its axis")
+    assert table.notes[2].startswith("Fasten a rod's end to its support last, while the scaffold holds")
     assert table.notes[4] == "From these directions rods turn in their supports: erected up to 0.0° (S1)."
     assert "nearer than 30 mm" in table.notes[5]
     assert table.notes[5].endswith("clash: S0 and S1, 12.5 mm, S1 and S2, 20.0 mm.")

@@ -319,7 +319,7 @@ def supports(built: Built) -> Table:
         "x, y and z are those of the axis that ends there, a rod's or an edge beam's, not of the ground under it.",
         "Supports stand where they are: before, during and after the pour. Forces are those of the rods' ends on them, "
         "at the feet of edge beams (E0, E1, …) those of the beams, with the load that stands on the support itself.",
-        "Fasten a rod's end to its support last, where it lies along its axis: a rod that is pushed by the little that a support is off bows out.",
+        "Fasten a rod's end to its support last, while the scaffold holds the crossings, where it lies along its axis, with some mm of rod to spare: pushed by the little that a support is off it bows out.",
         "Bearing, from x towards y, and rise are those of the axis' tangent at the support in the wanted shape; of beams that meet "
         "in one, the first one's.",
         *turning_note(net, _told_states(built)),
