@@ -189,8 +189,8 @@ def _stressed(own: tuple[float, float], then: tuple[float, float] | None) -> Cel
 
     found = words(own)
     care = (
-        f"{found}, which breaks rods. Fasten rods' ends at their supports last, where they lie, and tighten "
-        "cables to their force before any load"
+        f"{found}, which breaks rods. Fasten rods' ends at their supports last, on a scaffold and where they lie, "
+        "and tighten cables to their force before any load"
     )
     if then is not None:
         found += f"; adjusted on site {words(then)}"
