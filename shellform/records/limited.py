@@ -163,8 +163,10 @@ def _strained_as_built(rows: Mapping[str, DesignRecord], designs: Sequence[str],
         if row is None or row.built_shape is None:
             continue
         own, then = row.built_shape, row.adjusted_shape
+        before = rows[name].loads.get("none")
+        tight = before is None or before.cable_force_max is None or before.cable_force_max > 0.0
         if own.stress is not None:
-            rods[name] = _stressed(own.stress, None if then is None else then.stress)
+            rods[name] = _stressed(own.stress, None if then is None else then.stress, tight=tight)
         if own.pull is not None:
             cables[name] = _pulled(own.pull, None if then is None else then.pull, force)
     limits = "100 % breaks them", f"{newtons(force)} are cable.force_max"
@@ -179,19 +181,17 @@ def _strained_as_built(rows: Mapping[str, DesignRecord], designs: Sequence[str],
     ]
 
 
-def _stressed(own: tuple[float, float], then: tuple[float, float] | None) -> Cell:
+def _stressed(own: tuple[float, float], then: tuple[float, float] | None, *, tight: bool) -> Cell:
     """The rods' stress as built over their strength, the median and the worst, and `then`, adjusted on
-    site."""
+    site; `tight`: whether a cable pulls before any load."""
 
     def words(stress: tuple[float, float]) -> str:
         usual, worst = (number(100.0 * each) for each in stress)
         return f"{usual} % of the strength, {worst} % in the worst"
 
     found = words(own)
-    care = (
-        f"{found}, which breaks rods. Fasten rods' ends at their supports last, on a scaffold and where they lie, "
-        "and tighten cables to their force before any load"
-    )
+    cables = ", and tighten cables to their force before any load" if tight else ""
+    care = f"{found}, which breaks rods. Fasten rods' ends last, on a scaffold and where they lie{cables}"
     if then is not None:
         found += f"; adjusted on site {words(then)}"
         care += f": then {words(then)}"

@@ -125,7 +125,10 @@ def built_shape_words(own: BuiltShapeRecord) -> str:
 def adjusted_words(own: BuiltShapeRecord) -> str:
     """How far drawn structures are off, and what they bear, once they have been adjusted on site."""
     most, worst = (number(1e3 * each, 2) for each in (own.deviation_max, own.deviation_max_worst))
-    return f"adjusted on site {most} mm off at most, {worst} mm in the worst{_strain_words(own)}"
+    return (
+        f"adjusted on site, as a scaffold allows, {most} mm off at most in the median of {own.structures}, "
+        f"{worst} mm in the worst{_strain_words(own)}"
+    )
 
 
 def _strain_words(own: BuiltShapeRecord) -> str:

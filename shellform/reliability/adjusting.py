@@ -12,7 +12,7 @@ much, N0, at the length l between its ends,
     l0 = l / (1 + N0 / EA),
 
 all of them round after round, since each slackens its neighbours. One that hangs slack there keeps its
-length, and no turnbuckle goes farther than its reserve.
+length, and none goes farther than a turnbuckle's reserve, whatever range the case gives to turnbuckles.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from shellform.reliability.standing import Workshop
 
 _ROUNDS = 3  # of tightening: a fourth changes forces by per cents
 _FELT = 0.02  # of the largest force before any load: what pulls less than that hangs slack on site
-_REACH = 0.02  # of its rest length, by which a cable is tightened or let out at the most
+RESERVE = 0.02  # of its rest length, by which a cable is tightened or let out at the most
 
 
 def adjusted(workshop: Workshop, errors: Errors) -> Errors:
@@ -61,9 +61,9 @@ def tightened(workshop: Workshop, errors: Errors) -> Errors:
     planned = nominal.network.cables
     force = planned.tension(nominal.unloaded)
     felt = force > _FELT * force.max(initial=0.0)
-    reach = _REACH * planned.rest_length
+    reach = RESERVE * planned.rest_length
     for _ in range(_ROUNDS if felt.any() else 0):
-        found = workshop.limit(errors, most=0.0, tell=False)
+        found = workshop.limit(errors, most=0.0, tell=False, heeding=False)
         if found.kind == UNLOADED:
             break
         own = built_cables(planned, nominal.present, errors, nominal.imperfections)

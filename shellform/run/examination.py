@@ -53,6 +53,7 @@ from shellform.written import write_arrays
 _BEYOND = 1.5  # times the factor asked for, up to which a path is followed at least
 # In structures drawn, measured: 33 on a scaffold at once, 60 where supports that move in break rods before.
 _RAISING_TAKES = 50
+_ADJUSTED_TAKES = 30  # the same of the twenty that are adjusted on site
 _GUIDED = 0.25  # of the largest load, the steps in which the guide looks along the path
 
 
@@ -80,7 +81,7 @@ def examine(workspace: Workspace) -> Summary:
     sampled = [each for each in every if each.name != "unbraced"]
     routes = len(paths(run.loads))
     planned = routes * (entry.compared * len(sampled) + entry.drawn - entry.compared)
-    clock = Clock(planned, _RAISING_TAKES)
+    clock = Clock(planned, _RAISING_TAKES + _ADJUSTED_TAKES)
     for each in sampled:
         if each.name in alike:
             take_drawn(workspace.folder, alike[each.name], each.name, each.key(entry.seed))
@@ -246,6 +247,11 @@ def _adjusted(workspace: Workspace, each: Examined, summary: Summary) -> Summary
     workspace.say("safety", f"the {each.name} design adjusted on site", Kind.BEGAN)
     entry = workspace.case.safety
     shape = adjusted_shape(workspace.folder, each, entry.drawn, entry.seed)
+    if shape is None:
+        text = (
+            f"no structure of the {each.name} design rests under the design load once it is adjusted on site"
+        )
+        workspace.say("safety", text, Kind.NOTE)
     own = replace(record, loads={**record.loads, "design": replace(row, adjusted_shape=shape)})
     return summary.with_design(each.name, own)
 

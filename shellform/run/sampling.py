@@ -126,12 +126,7 @@ def drawn_of(
         write_drawn(folder, examined.name, kept)
         clock.took(len(some), clock_without_compiling() - began)
         tell(len(path.factors))
-    return DrawnPath(
-        path.factors[:count],
-        path.stand[:count],
-        tuple(each for each in path.snaps if each.number < count),
-        tuple(each for each in path.shapes if each.number < count),
-    )
+    return _first(path, count)
 
 
 def adjusted_of(folder: Path, examined: Examined, *, count: int, seed: int) -> DrawnPath:
@@ -139,20 +134,43 @@ def adjusted_of(folder: Path, examined: Examined, *, count: int, seed: int) -> D
     the design load lies; those in the folder are taken from there. Raises NotConverged where the perfect
     structure has no unloaded equilibrium."""
     kept = read_drawn(folder, examined.name, examined.key(seed))
-    if len(kept.adjusted.factors) == count:
-        return kept.adjusted
     load, own = next((load, own) for load, own in paths(examined.loads).items() if "design" in own)
-    workshop = Workshop(examined.nominal(load))
+    workshop = None
+    while (first := len(kept.adjusted.factors)) < count:
+        workshop = workshop or Workshop(examined.nominal(load))
+        numbers = list(range(first, min(first + _AT_ONCE, count)))
+        some = _adjusted(workshop, examined.tolerances, seed, numbers, own)
+        kept = replace(kept, adjusted=kept.adjusted.and_then(_path(examined, some)))
+        write_drawn(folder, examined.name, kept)
+    return _first(kept.adjusted, count)
+
+
+def _adjusted(
+    workshop: Workshop,
+    tolerances: Tolerances,
+    seed: int,
+    numbers: Sequence[int],
+    shares: Mapping[str, float],
+) -> list[DrawnOutcome]:
+    """The structures of these numbers under the seed, adjusted, on a path of which loads are these `shares`,
+    that of the design load among them."""
 
     def one(number: int) -> DrawnOutcome:
-        errors = draw_errors(workshop.nominal.members, examined.tolerances, seed, number)
-        return workshop.load(
-            adjusted(workshop, errors), number=number, marks=tuple(own.values()), resting=own["design"]
-        )
+        errors = adjusted(workshop, draw_errors(workshop.nominal.members, tolerances, seed, number))
+        marks = tuple(shares.values())
+        return workshop.load(errors, number=number, marks=marks, resting=shares["design"])
 
-    path = _path(examined, side_by_side(one, list(range(count))))
-    write_drawn(folder, examined.name, replace(kept, adjusted=path))
-    return path
+    return side_by_side(one, numbers)
+
+
+def _first(path: DrawnPath, count: int) -> DrawnPath:
+    """The first so many of a path's structures."""
+    return DrawnPath(
+        path.factors[:count],
+        path.stand[:count],
+        tuple(each for each in path.snaps if each.number < count),
+        tuple(each for each in path.shapes if each.number < count),
+    )
 
 
 def _path(examined: Examined, outcomes: Sequence[DrawnOutcome]) -> DrawnPath:

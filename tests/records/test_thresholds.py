@@ -470,6 +470,11 @@ def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_b
     then = made((1.06, 1.3), (18.0, 26.0), shape((0.61, 1.01), (17.0, 20.5)))
     assert "loosen it beside them" in then[rods].caution
     assert then[cables].caution.endswith("20.5 N in the worst. For more than that take stronger cables")
+    slack = {"none": load("none", cable_force_max=0.0)}
+    slack["design"] = load("design", built_shape=shape((1.06, 1.3), (18.0, 18.0)))
+    rows = summary(designs).with_design("polished", design(loads=slack, cable_force_max=4.0))
+    cell = {c.name: c for c in checks({"polished": shell}, designs, rows, BOUNDS)}[rods].cells["polished"]
+    assert cell.caution.endswith("on a scaffold and where they lie"), "no cable pulls before any load"
     then = made((0.9, 0.999), (18.0, 20.0), shape((0.61, 1.01), (17.0, 20.5)))
     assert then[rods].caution == then[cables].caution == "", "as built it holds without"
     for nothing in ((None, None), (0.0, 0.0)):
@@ -622,7 +627,7 @@ def test_words_of_the_shape_as_built_name_what_drives_it():
     assert built_shape_words(pulled).endswith(", a cable at 18 N (26 N)")
     assert (
         adjusted_words(pulled)
-        == "adjusted on site 53 mm off at most, 67 mm in the worst, a cable at 18 N (26 N)"
+        == "adjusted on site, as a scaffold allows, 53 mm off at most in the median of 19, 67 mm in the worst, a cable at 18 N (26 N)"
     )
 
 

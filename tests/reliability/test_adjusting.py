@@ -109,7 +109,7 @@ def test_cables_that_hang_slack_as_planned_keep_their_length_and_none_goes_beyon
     found = tightened(Workshop(nominal), errors).cable_length[nominal.present]
     assert (found[~felt] == errors.cable_length[nominal.present][~felt]).all()
     assert (found[felt] != errors.cable_length[nominal.present][felt]).all()
-    monkeypatch.setattr(adjusting, "_REACH", 1e-6)
+    monkeypatch.setattr(adjusting, "RESERVE", 1e-6)
     found = tightened(Workshop(nominal), errors).cable_length[nominal.present]
     assert np.abs(found[felt]).max() == pytest.approx(1e-6 * cables.rest_length[felt].max(), rel=0.3)
     assert (np.abs(found[felt]) <= 1.000001e-6 * cables.rest_length[felt]).all()

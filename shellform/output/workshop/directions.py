@@ -62,6 +62,16 @@ def away(net: Net, state: State) -> dict[int, tuple[str, str, Reals]]:
     return ends
 
 
+def fastening_note(net: Net) -> tuple[str, ...]:
+    """When rods' ends are fastened to supports and edge beams, a sentence; nothing where none is."""
+    if not net.edges and not set(rods_away(net, net.target)) & set(net.supports.tolist()):
+        return ()
+    return (
+        "Fasten a rod's end to its support or edge beam last, while a scaffold holds its crossings, where it lies along its axis: "
+        "pushed by the little that a support is off it bows out.",
+    )
+
+
 def turning_note(net: Net, states: Mapping[str, State]) -> tuple[str, ...]:
     """How much rods turn in their supports from the wanted shape to each of the `states`, a sentence; nothing
     where none stands on a support."""

@@ -42,18 +42,17 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.grid import Grid, rod_names
 from shellform.output.workshop.block_schedule import block_table
 from shellform.output.workshop.cable_forces import force_notes, tightening_notes
-from shellform.output.workshop.directions import away, turning_note
+from shellform.output.workshop.directions import away, fastening_note, turning_note
 from shellform.output.workshop.edge_schedule import bundled_note, edge_table
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.splice_schedule import cutting_notes, lath_names, splice_table
 from shellform.output.workshop.turnbuckles import cutting_note, turnbuckle_notes
 from shellform.quantities import newtons
+from shellform.reliability.adjusting import RESERVE
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.tables import Table, for_the_workshop, write_tables
-
-RESERVE = 0.02  # of the rest length, at both ends of a turnbuckle's range
 
 
 @dataclass(frozen=True)
@@ -134,7 +133,11 @@ def rods(built: Built, cutting: Cutting) -> Table:
         "rod", "direction", "length [m]", "section", "mass [kg]", "crossings",
         "marks from the first end [mm]", "crossing numbers", "bars", "note",
     )  # fmt: skip
-    notes = (*cutting_notes(cutting, rod_names(built.grid)), *bundled_note(built.shell))
+    notes = (
+        *cutting_notes(cutting, rod_names(built.grid)),
+        *bundled_note(built.shell),
+        "Lengths and marks are those from one end's axis to the other's: where ends are fastened last, leave some mm more beyond both.",
+    )
     if layers_of(section) == 2:
         notes += ("Each rod is two laths of that length; masses are of both, without shear blocks.",)
     if not weight:
@@ -319,9 +322,9 @@ def supports(built: Built) -> Table:
         "x, y and z are those of the axis that ends there, a rod's or an edge beam's, not of the ground under it.",
         "Supports stand where they are: before, during and after the pour. Forces are those of the rods' ends on them, "
         "at the feet of edge beams (E0, E1, …) those of the beams, with the load that stands on the support itself.",
-        "Fasten a rod's end to its support last, while the scaffold holds the crossings, where it lies along its axis, with some mm of rod to spare: pushed by the little that a support is off it bows out.",
         "Bearing, from x towards y, and rise are those of the axis' tangent at the support in the wanted shape; of beams that meet "
         "in one, the first one's.",
+        *fastening_note(net),
         *turning_note(net, _told_states(built)),
         f"Supports whose axes are nearer than {1e3 * shoe_width(built):.3g} mm, the width of a shoe (three rod "
         "diameters), clash: "
