@@ -43,7 +43,7 @@ class TolerancesEntry(Entry):
         None, description=f"share, of all connectors together; left out: 0, {SOURCES['connectors_all']}"
     )
     tape: _Share | None = Field(
-        None, description=f"share, of all lengths along a rod; left out: 0, {SOURCES['tape']}"
+        None, description=f"share, of all lengths along a rod; left out: {SOURCES['tape']}"
     )
 
 

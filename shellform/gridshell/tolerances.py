@@ -43,8 +43,8 @@ SOURCES: Final[Mapping[str, str]] = {
     "supports": "DIN 18202 table 1 permits 10 mm in plan up to 1 m between points that are set out, two "
     "deviations; in a workshop (spans of 2 to 4 m): ISO 2768-1, class m, 2 mm, two deviations; scale "
     "model: drilled base plate, 0.1 mm",
-    "marks": "scribed to 1 mm, beside half of what a tape of class II may be off (2004/22/EC: 0.3 mm + 0.2 "
-    "mm/m); in a workshop (spans of 2 to 4 m): ISO 2768-1, class m, of the longest rod, two deviations; scale "
+    "marks": "scribed to 1 mm, beside half of the 0.3 mm that a tape of class II may be off anywhere (2004/22/EC); "
+    "in a workshop (spans of 2 to 4 m): ISO 2768-1, class m, of the longest rod, two deviations; scale "
     "model: 0.2 mm",
     "rod_stiffness": "JCSS Probabilistic Model Code part 3.2, modulus of elasticity: coefficient of "
     "variation 0.03",
@@ -62,8 +62,8 @@ SOURCES: Final[Mapping[str, str]] = {
     "causes don't hold; scale model: what callipers leave, 0.1 mm in a metre",
     "cable_stiffness_all": "the maker's mean modulus is taken as tested, unless a doubt about it is given here",
     "connectors_all": "the make's mean stiffness is taken as tested, unless a doubt about it is given here",
-    "tape": "counted in the marks, each for itself, unless it is given here: 1e-4 of a tape of class II, with marks "
-    "of 1 mm",
+    "tape": "half of the 0.2 mm a metre that a tape of class II may be off (2004/22/EC), alike along a rod; in a "
+    "workshop and of a scale model counted in the marks",
 }
 
 
@@ -145,13 +145,13 @@ def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float)
         require_number(value, above=0.0, where=name, give="metres, such as 0.9")
     model = span < SCALE_MODEL_BELOW
     if model:
-        cable_length, supports, marks = 1e-4, 1e-4, 2e-4
+        cable_length, supports, marks, tape = 1e-4, 1e-4, 2e-4, 0.0
     elif span < WORKSHOP_BELOW:
         cable_length, supports = _medium(longest_cable), 0.5 * _medium(span)
-        marks = 0.5 * _medium(longest_rod)
+        marks, tape = 0.5 * _medium(longest_rod), 0.0
     else:
         cable_length, supports = 2e-3 + longest_cable / 5000.0, 5e-3
-        marks = 1e-3 + 0.5 * (0.3e-3 + 0.2e-3 * longest_rod)
+        marks, tape = 1e-3 + 0.5 * 0.3e-3, 0.5 * 0.2e-3
     return Tolerances(
         cable_length=cable_length,
         cable_stiffness=0.05,
@@ -164,6 +164,7 @@ def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float)
         load_all=0.05,
         load_uneven=0.01 if model else 0.05,
         shape=1e-4 if model else 5e-4,
+        tape=tape,
     )
 
 

@@ -191,7 +191,7 @@ def _stressed(own: tuple[float, float], then: tuple[float, float] | None, *, tig
 
     found = words(own)
     cables = ", and tighten cables to their force before any load" if tight else ""
-    care = f"{found}, which breaks rods. Fasten rods' ends last, on a scaffold and where they lie{cables}"
+    care = f"{found}, which breaks rods. Fix supports last, where rods' ends lie on a scaffold{cables}"
     if then is not None:
         found += f"; adjusted on site {words(then)}"
         care += f": then {words(then)}"

@@ -1,10 +1,10 @@
 """Structures as built, adjusted on site before they are loaded: what errors of making and setting out bend
 rods and pull cables with is taken back where that costs nothing.
 
-Ends last. A rod is fastened at its support, or at the edge beam on which it ends, after it is clamped at its
-crossings, and where it lies along its own axis. With the support off by u, m, and t the rod's direction out
-of the shell there, its last segment is longer by t'u, and its last mark is off by nothing. Held where it was
-marked instead, a straight slender rod that is pushed by so little as 5 mm over a metre bows out by 45 mm.
+Supports last. A support is fixed to the ground after the rod that ends in it is clamped at its crossings,
+where the rod's end lies on the scaffold; so are ends on an edge beam to that. What supports are off, and
+what a rod's last mark is, strains nothing then. Set out beforehand instead, a support that is 5 mm off along
+a straight slender rod makes it bow out by 45 mm over a metre, and one 5 mm off across a stiff rod bends it.
 
 Force, not length. A cable that pulls before any load in the perfect structure is tightened until it pulls as
 much, N0, at the length l between its ends,
@@ -22,9 +22,9 @@ from dataclasses import replace
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.reliability.drawing import LEAST, Errors, built_cables
+from shellform.reliability.drawing import Errors, built_cables
+from shellform.reliability.members import Members
 from shellform.reliability.path_of_one import UNLOADED
-from shellform.reliability.perfect import Perfect
 from shellform.reliability.standing import Workshop
 
 _ROUNDS = 3  # of tightening: a fourth changes forces by per cents
@@ -33,26 +33,17 @@ RESERVE = 0.02  # of its rest length, by which a cable is tightened or let out a
 
 
 def adjusted(workshop: Workshop, errors: Errors) -> Errors:
-    """What a structure with the `errors` is off by when it has been adjusted, its ends first; where it has no
-    unloaded equilibrium, as far as it came to one."""
-    return tightened(workshop, ends_last(workshop.nominal, errors))
+    """What a structure with the `errors` is off by when it has been adjusted, its supports first; where it
+    has no unloaded equilibrium, as far as it came to one."""
+    return tightened(workshop, supports_last(workshop.nominal.members, errors))
 
 
-def ends_last(nominal: Perfect, errors: Errors) -> Errors:
-    """The errors with the rods' ends fastened where they lie along their axes."""
-    members, ends, places = nominal.members, nominal.network.beams.ends, nominal.unloaded.positions
-    made = members.beam_length
+def supports_last(members: Members, errors: Errors) -> Errors:
+    """The errors with supports fixed where rods' ends lie."""
     longer = errors.beam_length.copy()
     for rod in members.rods:
-        segments = rod.elements[: rod.marks[1]], rod.elements[rod.marks[-2] :]
-        for segment in segments:
-            longer[segment] = 0.0
-        for segment, last, inward in zip(segments, (0, -1), rod.sense[[0, -1]] * (1.0, -1.0), strict=True):
-            end, beside = ends[rod.elements[last]] if inward > 0.0 else ends[rod.elements[last]][::-1]
-            out = places[end] - places[beside]
-            farther = float(out @ errors.supports[end, :3]) / float(np.linalg.norm(out))
-            longer[segment] += farther * made[segment] / made[segment].sum()
-    return replace(errors, beam_length=np.maximum(longer, (LEAST - 1.0) * made))
+        longer[rod.elements[: rod.marks[1]]] = longer[rod.elements[rod.marks[-2] :]] = 0.0
+    return replace(errors, beam_length=longer, supports=np.zeros_like(errors.supports))
 
 
 def tightened(workshop: Workshop, errors: Errors) -> Errors:

@@ -42,7 +42,7 @@ from shellform.structure.elements.state import State, moved
 
 PERFECT = -1  # the number of the structure without errors
 SOFT_MODES = 3  # softest modes in which the shape is off
-LEAST = 0.2  # of an element's length is left to it by errors of marks
+_LEAST = 0.2  # of an element's length is left to it by errors of marks
 _LEAST_CABLE = 0.05  # of a cable's rest length
 
 
@@ -120,7 +120,7 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
     )
     made = members.rod_elements
     off = np.diff(t.marks * z["marks"][made.marks], axis=1)[:, 0]
-    longer = np.maximum(off / made.segment_length + t.tape * z["tape"][made.segment_rod], LEAST - 1.0)
+    longer = np.maximum(off / made.segment_length + t.tape * z["tape"][made.segment_rod], _LEAST - 1.0)
     length[made.elements] = longer[made.segment] * members.beam_length[made.elements]
     stiff = np.exp(t.rod_stiffness * z["rod_stiffness"])
     stiffness[made.elements], stiffness[made.locks] = stiff[made.rod], stiff[made.locked]

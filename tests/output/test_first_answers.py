@@ -177,7 +177,7 @@ def test_how_far_off_is_told_in_millimetres_and_is_bad_where_the_shell_does_not_
     then = SimpleNamespace(deviation_max=0.021, deviation_max_worst=0.0491, structures=19)
     told = first_answers._how_far(replace(main, built_shape=shape, adjusted_shape=then), None, [])
     assert told.detail.endswith(
-        "the worst is 79 mm off. With rods' ends fastened last, on a scaffold and where they lie, and cables tightened to "
+        "the worst is 79 mm off. With supports fixed last, where rods' ends lie on a scaffold, and cables tightened to "
         "their force before any load 21 mm, 49 mm in the worst of 19"
     )
 

@@ -20,7 +20,7 @@ from shellform.gridshell.reactions import reactions
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import nesting, schedules
 from shellform.output.workshop.cable_forces import force_notes, tightening_notes
-from shellform.output.workshop.directions import edge_away, fastening_note, rods_away
+from shellform.output.workshop.directions import edge_away, fixing_note, rods_away
 from shellform.output.workshop.setting_out import elevations, support_plan
 from shellform.site.measurements import read_places
 from shellform.structure.elements.sections import Material, Rectangle
@@ -565,9 +565,7 @@ def test_supports_lead_along_the_tangents_of_rods_and_of_edge_beams_at_their_fee
     assert table.columns[9:] == tuple(
         f"{name}: on the support along {axis} [N]" for name in ("erected", "design") for axis in "xyz"
     )
-    assert table.notes[3].startswith(
-        "Fasten a rod's end to its support or edge beam last, while a scaffold holds"
-    )
+    assert table.notes[3].startswith("Fix a support to the ground, and a rod's end to its edge beam, last")
     assert table.notes[4] == "From these directions rods turn in their supports: erected up to 0.0° (S1)."
     assert "nearer than 30 mm" in table.notes[5]
     assert table.notes[5].endswith("clash: S0 and S1, 12.5 mm, S1 and S2, 20.0 mm.")
@@ -575,7 +573,7 @@ def test_supports_lead_along_the_tangents_of_rods_and_of_edge_beams_at_their_fee
 
 
 @pytest.mark.parametrize(("supports", "edges", "told"), [([0], (), 1), ([1], ("a beam",), 1), ([1], (), 0)])
-def test_ends_are_to_be_fastened_last_where_one_is_fastened(supports, edges, told):
+def test_supports_are_to_be_fixed_last_where_a_rod_ends_on_one(supports, edges, told):
     place = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
     rod = SimpleNamespace(nodes=np.arange(3), direction="u")
     net = SimpleNamespace(
@@ -584,7 +582,7 @@ def test_ends_are_to_be_fastened_last_where_one_is_fastened(supports, edges, tol
         supports=np.array(supports),
         target=at_rest(place),
     )
-    assert len(fastening_note(net)) == told
+    assert len(fixing_note(net)) == told
 
 
 def test_an_edge_beam_s_first_foot_leads_along_the_beam(monkeypatch):

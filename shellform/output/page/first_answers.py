@@ -213,7 +213,7 @@ def _on_site(then: BuiltShapeRecord | None) -> str:
     if then is None:
         return ""
     return (
-        ". With rods' ends fastened last, on a scaffold and where they lie, and cables tightened to their force before any load "
+        ". With supports fixed last, where rods' ends lie on a scaffold, and cables tightened to their force before any load "
         f"{_mm(then.deviation_max)}, {_mm(then.deviation_max_worst)} in the worst of {then.structures}"
     )
 

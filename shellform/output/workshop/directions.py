@@ -62,13 +62,13 @@ def away(net: Net, state: State) -> dict[int, tuple[str, str, Reals]]:
     return ends
 
 
-def fastening_note(net: Net) -> tuple[str, ...]:
-    """When rods' ends are fastened to supports and edge beams, a sentence; nothing where none is."""
+def fixing_note(net: Net) -> tuple[str, ...]:
+    """When supports are fixed, and rods' ends to edge beams, a sentence; nothing where no rod ends on one."""
     if not net.edges and not set(rods_away(net, net.target)) & set(net.supports.tolist()):
         return ()
     return (
-        "Fasten a rod's end to its support or edge beam last, while a scaffold holds its crossings, where it lies along its axis: "
-        "pushed by the little that a support is off it bows out.",
+        "Fix a support to the ground, and a rod's end to its edge beam, last, where the rod's end lies while a scaffold holds its "
+        "crossings: rods that are bent by the little that a support is off bow out, and thick ones break.",
     )
 
 

@@ -42,7 +42,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.grid import Grid, rod_names
 from shellform.output.workshop.block_schedule import block_table
 from shellform.output.workshop.cable_forces import force_notes, tightening_notes
-from shellform.output.workshop.directions import away, fastening_note, turning_note
+from shellform.output.workshop.directions import away, fixing_note, turning_note
 from shellform.output.workshop.edge_schedule import bundled_note, edge_table
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.splice_schedule import cutting_notes, lath_names, splice_table
@@ -136,7 +136,6 @@ def rods(built: Built, cutting: Cutting) -> Table:
     notes = (
         *cutting_notes(cutting, rod_names(built.grid)),
         *bundled_note(built.shell),
-        "Lengths and marks are those from one end's axis to the other's: where ends are fastened last, leave some mm more beyond both.",
     )
     if layers_of(section) == 2:
         notes += ("Each rod is two laths of that length; masses are of both, without shear blocks.",)
@@ -324,7 +323,7 @@ def supports(built: Built) -> Table:
         "at the feet of edge beams (E0, E1, …) those of the beams, with the load that stands on the support itself.",
         "Bearing, from x towards y, and rise are those of the axis' tangent at the support in the wanted shape; of beams that meet "
         "in one, the first one's.",
-        *fastening_note(net),
+        *fixing_note(net),
         *turning_note(net, _told_states(built)),
         f"Supports whose axes are nearer than {1e3 * shoe_width(built):.3g} mm, the width of a shoe (three rod "
         "diameters), clash: "
