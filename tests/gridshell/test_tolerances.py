@@ -74,7 +74,7 @@ def test_what_spans_two_to_four_metres_is_built_as_workshops_do(cable, permitted
 
 
 def test_on_site_a_tape_is_off_alike_along_a_rod_however_long_that_is_and_marks_by_themselves():
-    """Directive 2004/22/EC, class II: 0.3 mm and 0.2 mm a metre, two deviations; marks are scribed to 1 mm."""
+    """Directive 2004/22/EC, class II: 0.3 mm and 0.2 mm a metre, two deviations; scribed to 1 mm."""
     short, long = (tolerances_of_size(10.0, longest_rod=each, longest_cable=1.0) for each in (5.0, 60.0))
     assert (short.marks, short.tape) == (long.marks, long.tape) == (pytest.approx(1.15e-3), 1e-4)
 
