@@ -12,7 +12,7 @@ from shellform.case.build_safety import case_safety, case_tolerances, critical_f
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.tolerances import SOURCES, default_tolerances
-from shellform.records.drawn import DrawnPath, DrawnSnap, read_drawn
+from shellform.records.drawn import DrawnPath, DrawnSnap, read_drawn, write_drawn
 from shellform.records.progress import Kind
 from shellform.records.summary import read_summary, write_summary
 from shellform.reliability.adjusting import adjusted
@@ -163,7 +163,7 @@ def test_of_the_shape_as_built_the_median_the_worst_and_what_drives_it_are_told(
         assert set(told.causes) == set(tolerances.causes)
 
 
-def test_of_the_design_to_build_the_same_structures_are_told_adjusted_on_site(whole, monkeypatch):
+def test_of_the_design_to_build_the_same_structures_are_told_adjusted_on_site(whole, monkeypatch, tmp_path):
     run = read_run(whole[0])
     best = run.summary.verdict.design
     for name, design in run.summary.designs.items():
@@ -182,8 +182,12 @@ def test_of_the_design_to_build_the_same_structures_are_told_adjusted_on_site(wh
     assert told.deviation_max_worst == pytest.approx(max(far), abs=1e-8)
     assert told.deviation_max == pytest.approx(np.median(far), abs=1e-8)
     assert told.causes == {}, "what drives it is told of those that weren't"
+    shutil.copytree(whole[0] / "designs", tmp_path / "designs")
+    kept = read_drawn(whole[0], best, each.key(0))
+    write_drawn(tmp_path, best, replace(kept, adjusted=sampling._first(kept.adjusted, 10)))
+    assert adjusted_shape(tmp_path, each, 12, 0) == told, "broken off after ten it goes on"
     monkeypatch.setattr(sampling, "Workshop", None)
-    assert adjusted_shape(whole[0], each, 12, 0) == told, "kept"
+    assert adjusted_shape(tmp_path, each, 12, 0) == told, "kept"
 
 
 def test_a_limit_on_the_shape_as_built_is_judged_by_the_worst_structure(file, whole):
