@@ -27,7 +27,7 @@ from shellform.reliability.members import Members
 from shellform.reliability.path_of_one import UNLOADED
 from shellform.reliability.standing import Workshop
 
-_ROUNDS = 3  # of tightening: a fourth changes forces by per cents
+_ROUNDS = 3  # of tightening: a fourth changes the largest force and stress by one per cent
 _FELT = 0.02  # of the largest force before any load: what pulls less than that hangs slack on site
 RESERVE = 0.02  # of its rest length, by which a cable is tightened or let out at the most
 
