@@ -37,7 +37,7 @@ from shellform.surface.shape.target import Surface
 ELEMENTS = 2  # a segment
 NEEDED = 1.5  # times the design load, which the perfect structure bears: drawn ones fall earlier
 ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path the design load then is
-DRAWN, SEED, ENLARGED = 40, 1, 1.25  # structures, their seed, and how much larger their errors are
+DRAWN, SEED, ENLARGED = 40, 1, 1.5  # structures, their seed, and how much larger their errors are
 _SEED = SafetyEntry.model_validate({}).seed  # under which a case that says nothing else is judged
 STRESSED = 0.95  # of the strength, at the most, under the additional load
 PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond it takes no cables away

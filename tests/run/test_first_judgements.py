@@ -228,7 +228,7 @@ def test_structures_are_drawn_under_the_additional_load_with_larger_errors_until
             assert nominal == (0.997, 12.0), "1.2 times the load"
 
         def load_numbers(self, tolerances, *, seed, numbers):
-            assert tolerances == ("usual", 1.25)
+            assert tolerances == ("usual", 1.5)
             found.extend(numbers)
             return [SimpleNamespace(stands=number != falls) for number in numbers]
 
