@@ -190,12 +190,15 @@ class Workshop:
         step: float = STEP,
         marks: Sequence[float] = (),
         resting: float | None = None,
+        adjust: Callable[[Errors], Errors] | None = None,
     ) -> list[DrawnOutcome]:
-        """The structures of these numbers under the seed, each as `load` loads it."""
+        """The structures of these numbers under the seed, each as `load` loads it, with the errors that
+        `adjust` leaves (None: all of them)."""
 
         def one(number: int) -> DrawnOutcome:
             errors = draw_errors(self.nominal.members, tolerances, seed, number)
-            return self.load(errors, number=number, step=step, marks=marks, resting=resting)
+            left = errors if adjust is None else adjust(errors)
+            return self.load(left, number=number, step=step, marks=marks, resting=resting)
 
         return side_by_side(one, list(numbers))
 

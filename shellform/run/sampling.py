@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +20,10 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.paths import deviations
 from shellform.records.drawn import DrawnPath, DrawnShape, DrawnSnap, read_drawn, write_drawn
 from shellform.reliability.adjusting import adjusted
-from shellform.reliability.drawing import draw_errors
 from shellform.reliability.path_of_one import DrawnOutcome
 from shellform.reliability.perfect import TO_ITS_END, Perfect, perfect
 from shellform.reliability.safety import paths
 from shellform.reliability.standing import Workshop
-from shellform.structure.elements.threads import side_by_side
 
 _AT_ONCE = 10  # structures, before they are kept
 LOOKED_AT = 20  # structures of which the shape is looked at: each takes some factorisations more
@@ -138,29 +137,17 @@ def adjusted_of(folder: Path, examined: Examined, *, count: int, seed: int) -> D
     workshop = None
     while (first := len(kept.adjusted.factors)) < count:
         workshop = workshop or Workshop(examined.nominal(load))
-        numbers = list(range(first, min(first + _AT_ONCE, count)))
-        some = _adjusted(workshop, examined.tolerances, seed, numbers, own)
+        some = workshop.load_numbers(
+            examined.tolerances,
+            seed=seed,
+            numbers=range(first, min(first + _AT_ONCE, count)),
+            marks=tuple(own.values()),
+            resting=own["design"],
+            adjust=partial(adjusted, workshop),
+        )
         kept = replace(kept, adjusted=kept.adjusted.and_then(_path(examined, some)))
         write_drawn(folder, examined.name, kept)
     return _first(kept.adjusted, count)
-
-
-def _adjusted(
-    workshop: Workshop,
-    tolerances: Tolerances,
-    seed: int,
-    numbers: Sequence[int],
-    shares: Mapping[str, float],
-) -> list[DrawnOutcome]:
-    """The structures of these numbers under the seed, adjusted, on a path of which loads are these `shares`,
-    that of the design load among them."""
-
-    def one(number: int) -> DrawnOutcome:
-        errors = adjusted(workshop, draw_errors(workshop.nominal.members, tolerances, seed, number))
-        marks = tuple(shares.values())
-        return workshop.load(errors, number=number, marks=marks, resting=shares["design"])
-
-    return side_by_side(one, numbers)
 
 
 def _first(path: DrawnPath, count: int) -> DrawnPath:

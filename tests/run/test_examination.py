@@ -255,7 +255,7 @@ def test_of_designs_that_are_the_same_one_is_examined(file, copy, whole, monkeyp
         shutil.copy(each, each.with_name(each.name.replace("optimised", "polished")))
     summary = read_summary(copy)
     write_summary(copy, summary.with_design("polished", summary.designs["optimised"]))
-    followed, drawn = [], []
+    followed, drawn, on_site = [], [], []
     critical, load = examination._critical, Workshop.load_numbers
 
     def follow(case, each, record):
@@ -263,7 +263,7 @@ def test_of_designs_that_are_the_same_one_is_examined(file, copy, whole, monkeyp
         return critical(case, each, record)
 
     def count(self, *asked, numbers, **given):
-        drawn.extend(numbers)
+        (on_site if given.get("adjust") else drawn).extend(numbers)
         return load(self, *asked, numbers=numbers, **given)
 
     monkeypatch.setattr(examination, "_critical", follow)
@@ -271,6 +271,7 @@ def test_of_designs_that_are_the_same_one_is_examined(file, copy, whole, monkeyp
     run_case(load_case(file, FEW), copy, until="safety")
     assert sorted(followed) == ["initial", "optimised", "unbraced"]
     assert drawn == [*range(4), *range(4), *range(4, 12)], "the first four of it are those of the other"
+    assert on_site == [*range(12)], "of the one to build"
     assert read_summary(copy).designs["polished"].loads == read_summary(whole[0]).designs["optimised"].loads
 
 
