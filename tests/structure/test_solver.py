@@ -145,6 +145,21 @@ def test_one_entry_that_spoils_definiteness_is_seen_at_every_size(backend, rods,
     np.testing.assert_allclose(matrix.full(sound) @ matrix.factor(sound).solve(right), right, atol=1e-5)
 
 
+@pytest.mark.parametrize("name", ["cholmod", "superlu"])
+def test_mkl_stays_unloaded_where_another_solver_is_asked_for(name, monkeypatch):
+    """Loaded, its functions take the place of those that cvxopt brings for its quadratic programs."""
+    if name not in factorisation.installed():
+        pytest.skip(f"{name} isn't installed")
+    loaded = []
+    monkeypatch.setattr(factorisation.pardiso, "library", lambda: loaded.append(name))
+    monkeypatch.setenv("SHELLFORM_SOLVER", name)
+    assert factorisation.backend() == name
+    assert not loaded
+    monkeypatch.delenv("SHELLFORM_SOLVER")
+    factorisation.backend()
+    assert loaded
+
+
 @pytest.mark.skipif("cholmod" not in factorisation.installed(), reason="CHOLMOD isn't installed")
 def test_an_indefinite_matrix_is_refused_though_another_thread_asks_for_pivots_meanwhile(monkeypatch):
     monkeypatch.setenv("SHELLFORM_SOLVER", "cholmod")

@@ -51,8 +51,13 @@ _NAMES = {"mkl": "PARDISO (MKL)", "cholmod": "CHOLMOD (cvxopt)", "superlu": "Sup
 
 def installed() -> list[str]:
     """The solvers there are, the fastest first."""
-    there = {"mkl": pardiso.library() is not None, "cholmod": cholmod is not None, "superlu": True}
-    return [name for name, here in there.items() if here]
+    return [name for name in _NAMES if _is_installed(name)]
+
+
+def _is_installed(name: str) -> bool:
+    if name == "mkl":
+        return pardiso.library() is not None
+    return name == "superlu" or (name == "cholmod" and cholmod is not None)
 
 
 def column_blocks(count: int, size: int) -> Iterator[slice]:
@@ -67,14 +72,17 @@ def backend() -> str:
     """Which solver factorises: the one that SHELLFORM_SOLVER names, or the fastest there is. Raises
     InputError.
     """
-    known = installed()
-    asked = os.environ.get("SHELLFORM_SOLVER", known[0])
-    if asked not in known:
+    asked = os.environ.get("SHELLFORM_SOLVER")
+    if asked is None:
+        return installed()[0]
+    # MKL stays unloaded where another is asked for: in libraries loaded after it (cvxopt's for quadratic
+    # programs) its functions take the place of their own, and a search ends with other bytes.
+    if asked not in _NAMES or not _is_installed(asked):
         raise InputError(
             "is no solver installed here",
             where="SHELLFORM_SOLVER",
             value=asked,
-            remedy=f"There are: {', '.join(known)}.",
+            remedy=f"There are: {', '.join(installed())}.",
         )
     return asked
 
