@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from shellform.quantities import newtons, number
 from shellform.records.as_built import AsBuilt
 from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, on_worse_mesh, quantity
+from shellform.records.raising import SCAFFOLD, easiest
 from shellform.records.remedies import RodSizes, RodsOf, allow, allow_less, rounded_up
 from shellform.records.summary import DesignRecord, LoadRecord
 from shellform.records.words import exceeds, load_title
@@ -166,7 +167,10 @@ def _strained_as_built(rows: Mapping[str, DesignRecord], designs: Sequence[str],
         before = rows[name].loads.get("none")
         tight = before is None or before.cable_force_max is None or before.cable_force_max > 0.0
         if own.stress is not None:
-            rods[name] = _stressed(own.stress, None if then is None else then.stress, tight=tight)
+            ways = rows[name].ways_up
+            scaffold = not ways or easiest(ways).by == SCAFFOLD
+            stress = None if then is None else then.stress
+            rods[name] = _stressed(own.stress, stress, tight=tight, scaffold=scaffold)
         if own.pull is not None:
             cables[name] = _pulled(own.pull, None if then is None else then.pull, force)
     limits = "100 % breaks them", f"{newtons(force)} are cable.force_max"
@@ -181,9 +185,11 @@ def _strained_as_built(rows: Mapping[str, DesignRecord], designs: Sequence[str],
     ]
 
 
-def _stressed(own: tuple[float, float], then: tuple[float, float] | None, *, tight: bool) -> Cell:
+def _stressed(
+    own: tuple[float, float], then: tuple[float, float] | None, *, tight: bool, scaffold: bool
+) -> Cell:
     """The rods' stress as built over their strength, the median and the worst, and `then`, adjusted on
-    site; `tight`: whether a cable pulls before any load."""
+    site; `tight`: whether a cable pulls before any load, `scaffold`: whether it is raised by one."""
 
     def words(stress: tuple[float, float]) -> str:
         usual, worst = (number(100.0 * each) for each in stress)
@@ -191,7 +197,8 @@ def _stressed(own: tuple[float, float], then: tuple[float, float] | None, *, tig
 
     found = words(own)
     cables = ", and tighten cables to their force before any load" if tight else ""
-    care = f"{found}, which breaks rods. Fix supports last, where rods' ends lie on a scaffold{cables}"
+    last = "Fix supports last" if scaffold else "Raise it by a scaffold instead, fix supports last"
+    care = f"{found}, which breaks rods. {last}, where rods' ends lie on a scaffold{cables}"
     if then is not None:
         found += f"; adjusted on site {words(then)}"
         care += f": then {words(then)}"

@@ -14,6 +14,8 @@ from pypdf import PdfReader
 from shellform.errors import InputError
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import drawings, layout, nesting, schedules, setting_out
+from shellform.output.workshop.cable_forces import tightening_notes
+from shellform.output.workshop.directions import fixing_note
 from shellform.output.workshop.marks import PENS, Span, Stroke, Words, overlap
 from shellform.output.workshop.schedules import TitleBlock
 from tests.conftest import built_as
@@ -80,6 +82,13 @@ def test_the_cable_plan_names_every_cable_between_its_crossings(folder, built):
     assert turns == [str(turn) for turn in schedules.rounds(built.shell, built.design)]
     for text in on(space, "CROSSING_NUMBERS", "TEXT"):
         assert tuple(text.get_placement()[1].vec2) == pytest.approx(joints[int(text.dxf.text)], abs=1e-6)
+
+
+def test_the_sheets_say_to_what_cables_are_tightened_and_when_supports_are_fixed(built):
+    before = built.shell.cables(built.design).tension(built.states["none"])
+    assert set(tightening_notes(before)) < set(layout.cable_plan(built).notes)
+    assert set(fixing_note(built.shell.net)) < set(setting_out.support_plan(built).notes)
+    assert len(tightening_notes(before)) == len(fixing_note(built.shell.net)) == 1
 
 
 def test_the_cable_plan_s_rods_run_from_ring_to_ring(built):

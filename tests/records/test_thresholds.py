@@ -474,7 +474,14 @@ def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_b
     slack["design"] = load("design", built_shape=shape((1.06, 1.3), (18.0, 18.0)))
     rows = summary(designs).with_design("polished", design(loads=slack, cable_force_max=4.0))
     cell = {c.name: c for c in checks({"polished": shell}, designs, rows, BOUNDS)}[rods].cells["polished"]
-    assert cell.caution.endswith("where rods' ends lie on a scaffold"), "no cable pulls before any load"
+    assert cell.caution.endswith("Fix supports last, where rods' ends lie on a scaffold"), (
+        "no cable pulls before any load"
+    )
+    ways = WayUpRecord("scaffold", False, lost="It snaps"), WayUpRecord("supports", False, 0.9)
+    for raised, told in ((ways, "Raise it by a scaffold instead, fix"), (ways[:1], "breaks rods. Fix")):
+        rows = summary(designs).with_design("polished", design(loads=slack, ways_up=raised))
+        cell = {c.name: c for c in checks({"polished": shell}, designs, rows, BOUNDS)}[rods].cells["polished"]
+        assert f"{told} supports last, where rods' ends lie on a scaffold" in cell.caution
     then = made((0.9, 0.999), (18.0, 20.0), shape((0.61, 1.01), (17.0, 20.5)))
     assert then[rods].caution == then[cables].caution == "", "as built it holds without"
     for nothing in ((None, None), (0.0, 0.0)):

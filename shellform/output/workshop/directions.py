@@ -64,11 +64,18 @@ def away(net: Net, state: State) -> dict[int, tuple[str, str, Reals]]:
 
 def fixing_note(net: Net) -> tuple[str, ...]:
     """When supports are fixed, and rods' ends to edge beams, a sentence; nothing where no rod ends on one."""
-    if not net.edges and not set(rods_away(net, net.target)) & set(net.supports.tolist()):
+    supported = not set(rods_away(net, net.target)).isdisjoint(net.supports.tolist())
+    if not net.edges and not supported:
         return ()
+    if not net.edges:
+        last = "Fix supports last, where rods' ends"
+    elif supported:
+        last = "Fix supports, and rods' ends to edge beams, last, where these ends"
+    else:
+        last = "Fix edge beams' feet, and rods' ends to the beams, last, where they"
     return (
-        "Fix a support to the ground, and a rod's end to its edge beam, last, where the rod's end lies while a scaffold holds its "
-        "crossings: rods that are bent by the little that a support is off bow out, and thick ones break.",
+        f"{last} lie while a scaffold holds the crossings: rods that are bent by the little that a support is off bow out, "
+        "and thick ones break.",
     )
 
 

@@ -21,6 +21,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.grid import GridRod, rod_names
 from shellform.net.notes import NoteKind
 from shellform.output.workshop.block_schedule import block_marks
+from shellform.output.workshop.cable_forces import tightening_notes
 from shellform.output.workshop.marks import (
     MM,
     Box,
@@ -249,11 +250,13 @@ def cable_plan(built: Built) -> Sheet:
         sign, foot = (1.0, "bottom") if along[0] * along[1] > 0.0 else (-1.0, "top")
         spot = 0.5 * (a + b) + np.array([0.0, sign * 0.27 * MM * grid.spacing_v])
         marks.append(Words("CABLE_NAMES", point_of(spot), height, f"C{number}·{turn}", 0.0, "middle", foot))
+    before = built.shell.cables(built.design).tension(built.states["none"])
     notes = (
         "Drawn on the flat grid; the erected grid's cells are skewed. C12·3: cable 12, tightened in round 3.",
         "Where a cell has two cables, the upper name is that of the rising one.",
         "Rounds go from the supports to the crown; within a round tighten on opposite sides at a time "
         "(schedules/cables.csv).",
+        *tightening_notes(before),
         f"{how_many(len(pairs), 'cable', 'cables')}, joined to the lower rods; lengths and forces at each stage: "
         "schedules/cables.csv.",
     )

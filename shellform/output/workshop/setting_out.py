@@ -14,6 +14,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.net.grid import rod_names
+from shellform.output.workshop.directions import fixing_note
 from shellform.output.workshop.edge_schedule import edge_names
 from shellform.output.workshop.marks import (
     MM,
@@ -82,6 +83,7 @@ def support_plan(built: Built) -> Sheet:
         "Supports are where the axes of rods and edge beams end; z is the axis' level, not the ground's under it. Rods stand as on the target.",
         "Directions of the rods at the supports: schedules/supports.csv. Survey targets: "
         "schedules/survey.csv.",
+        *fixing_note(built.shell.net),
         *built.origin_notes,
         *clash_notes(built),
     )
