@@ -17,7 +17,7 @@ import numpy as np
 from cvxopt import matrix, solvers
 from scipy.linalg import cho_factor, cho_solve
 
-from shellform.arrays import Reals, Record
+from shellform.arrays import Flags, Reals, Record
 from shellform.structure.elements.threads import side_by_side
 from shellform.work_clock import Work, counts_as
 
@@ -51,8 +51,12 @@ def minimise_quadratic(
     hessian: Reals | LowRank, slope: Reals, rows: Reals, values: Reals, lower: Reals, upper: Reals
 ) -> Reals | None:
     """The u (s,) with the least slope'u + u'hessian u / 2 where values + rows u <= 0 and lower <= u <= upper;
-    None where nothing meets them all. `hessian` (s, s) is positive semidefinite.
+    None where nothing meets them all. `hessian` (s, s) is positive semidefinite. What has one value only
+    between its bounds is no variable of the method, which stays within them.
     """
+    free = lower < upper
+    if not free.all():
+        return _of_the_free(free, hessian, slope, rows, values, lower, upper)
     size = len(slope)
     curved, condensed = _dense(hessian, rows) if isinstance(hessian, np.ndarray) else _low_rank(hessian, rows)
 
@@ -109,6 +113,30 @@ def minimise_quadratic(
     if answer["status"] != "optimal":
         return None
     return np.clip(np.array(answer["x"]).ravel(), lower, upper)
+
+
+def _of_the_free(
+    free: Flags,
+    hessian: Reals | LowRank,
+    slope: Reals,
+    rows: Reals,
+    values: Reals,
+    lower: Reals,
+    upper: Reals,
+) -> Reals | None:
+    """The same in the variables that are `free` (s,)."""
+    u = np.where(free, 0.0, lower)
+    left = values + rows @ u
+    if not free.any():
+        return u if (left <= 0.0).all() else None
+    own = LowRank(hessian.columns[free]) if isinstance(hessian, LowRank) else hessian[np.ix_(free, free)]
+    found = minimise_quadratic(
+        own, (slope + hessian @ u)[free], rows[:, free], left, lower[free], upper[free]
+    )
+    if found is None:
+        return None
+    u[free] = found
+    return u
 
 
 def _dense(hessian: Reals, rows: Reals) -> tuple[_Linear, _Condensed]:

@@ -257,6 +257,24 @@ def test_a_problem_with_curvature_of_few_columns_is_solved_as_the_dense_one():
     np.testing.assert_array_equal((wider @ np.ones(42))[-2:], 0.0)
 
 
+@pytest.mark.parametrize("few", [True, False])
+def test_variables_with_one_value_between_their_bounds_leave_the_others_as_they_would_be(few):
+    rng = np.random.default_rng(6)
+    columns, slope = LowRank(rng.normal(size=(30, 6))), rng.normal(size=30)
+    rows, values = rng.normal(size=(3, 30)), -rng.uniform(0.5, 1.0, 3)
+    low, high = -np.ones(30), np.ones(30)
+    low[::3] = high[::3] = 0.25
+    hessian = columns if few else columns.columns @ columns.columns.T
+    found = minimise_quadratic(hessian, slope, rows, values, low, high)
+    near = minimise_quadratic(hessian, slope, rows, values, low - 1e-7 * (low == high), high)
+    np.testing.assert_array_equal(found[::3], 0.25)
+    np.testing.assert_allclose(found, near, atol=1e-5)
+    assert minimise_quadratic(hessian, slope, rows, np.full(3, 1e3), low, high) is None
+    none = np.full(30, 1e-3)
+    np.testing.assert_array_equal(minimise_quadratic(hessian, slope, rows, values, none, none), none)
+    assert minimise_quadratic(hessian, slope, rows, np.full(3, 1e3), none, none) is None
+
+
 def test_curvature_of_few_columns_under_constraints_that_contradict_each_other_has_no_solution():
     rows = np.array([[1.0, 0.0], [-1.0, 0.0]])
     few = LowRank(np.ones((2, 1)))
