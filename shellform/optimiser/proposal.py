@@ -3,7 +3,8 @@
 In windows u = (y - y0)/w the objective is slope'u + u'H u/2 with the Gauss-Newton matrix H. The constraints
 are linear, held at a distance that covers what the last trial showed of their curvature (as Svanberg's
 approximations, 2002, are corrected by theirs, but by a constant, which shrinks with the window). The bounds
-are those of the window, of the variables (3), (4) and of cable forces (5) under the design load.
+are those of the window, of the variables (3), (4) and of cable forces (5), under the design load exactly,
+under others as far as is known beforehand (further_forces.py).
 
 Interior points (quadratic.py) solve it, and NLopt's MMA goes on from their answer. From the window's middle
 MMA's separable approximations come to the optimum only while windows are narrow: of a stiff dome's first step
@@ -22,6 +23,7 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.optimiser.convex import minimise
+from shellform.optimiser.further_forces import ROUNDS, further_forces
 from shellform.optimiser.guards import Guard, SolvedGuard
 from shellform.optimiser.quadratic import LowRank, minimise_quadratic
 from shellform.optimiser.solver import SequentialConvex
@@ -115,11 +117,21 @@ def propose(task: Task) -> tuple[Reals, float]:
             u = _from_there(evaluate, np.clip(u, low, high), low, high, task.solver.model_evaluations)
         return np.clip(np.zeros(len(width)), low, high) if u is None else u
 
-    if any(isinstance(held, SolvedGuard) for held in task.guards):
-        u = _guarded_in_turn(task, width, solved)
-    else:
-        u = solved(*_guarding(task, width))
-    y = model.origin + width * u
+    further = further_forces(model)
+    reserves = np.zeros(len(further))
+    for _ in range(ROUNDS):
+        for limit, reserve in zip(further, reserves, strict=True):  # which `solved` asks for
+            most = (limit.upper(reserve) - model.origin[:count]) / width[:count]
+            high[:count] = np.maximum(np.minimum(high[:count], most), low[:count])
+        if any(isinstance(held, SolvedGuard) for held in task.guards):
+            u = _guarded_in_turn(task, width, solved)
+        else:
+            u = solved(*_guarding(task, width))
+        y = model.origin + width * u
+        beyond = np.array([limit.beyond(y[:count]) for limit in further])
+        if (beyond <= 0.0).all():
+            break
+        reserves += np.maximum(beyond, 0.0)
     if task.groups is None:
         y[:count][y[:count] < _NONE * task.tension] = 0.0
     return y, evaluate(u)[0]
@@ -336,7 +348,8 @@ def _exact_in_tension(slope: Reals, model: StepModel) -> Reals:
 
 
 def _box(task: Task) -> tuple[Reals, Reals]:
-    """Bounds of y from those of the variables and the constraints (5) on the design load's cable forces."""
+    """Bounds of y from those of the variables, the constraints (5) on the design load's cable forces, and
+    which cables pull."""
     model = task.model
     count = model.tensions
     lower, upper = model.lower.copy(), model.upper.copy()

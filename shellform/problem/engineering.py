@@ -169,6 +169,10 @@ class LargestCableForce(Term):
         """One value, N; slack cables count with the push that they would give."""
         return _of_tensions(at, np.flatnonzero(at.design.present), self.scale, 1.0)
 
+    def of(self, tensions: Reals) -> float:
+        """The value, N, of `tensions` (c,), N, negative where slack cables would push."""
+        return _smooth(tensions, SHARPNESS / self.scale)[1]
+
 
 @dataclass(frozen=True)
 class LeastTension(Term):
