@@ -201,8 +201,9 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     """Takes away cables that the shell can do without (thinning.py), in batches, and lets the others make up
     for them.
 
-    Those left are kept taut while their tensions are optimised again; where designs are judged as built only
-    if it takes that to keep the limits. A batch that the shell doesn't bear, that breaks a limit more than
+    Those left are kept taut while their tensions are optimised again, and those that went don't come back,
+    unless more stiffness is asked for; where designs are judged as built only if it takes that to keep the
+    limits. A batch that the shell doesn't bear, that breaks a limit more than
     before, or that costs too much of the objective, is cut; a single cable that can't go is kept for good.
     """
     solver = search.solver
@@ -230,7 +231,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         # made a design stand
         if found is None and not it.fell and trial is not None:
             if trial.objective < worse(budget.objective, 1.0):
-                trial, it = _repaired(search, it, trial)
+                trial, it = _repaired(search, it, trial, reviving=False)
             found, it = _made_to_stand(search, it, trial, budget)
         if found is None:
             it = noted(search, it, trial or it.point, False)
@@ -278,15 +279,18 @@ def _without_slack(search: Search, it: Iterate) -> Iterate:
     )
 
 
-def _repaired(search: Search, it: Iterate, trial: Evaluated) -> tuple[Evaluated, Iterate]:
-    """A few steps from the trial with the cables that are left, none of which may go slack; and the iterate
-    with the window and the curvature that they found. What a step costs is no reason to refuse it: the first
-    one after more stiffness is asked for costs much, which the next one gets back."""
+def _repaired(
+    search: Search, it: Iterate, trial: Evaluated, *, reviving: bool = True
+) -> tuple[Evaluated, Iterate]:
+    """A few steps from the trial with the cables that are left, none of which may go slack, and those that
+    went where they may come back (`reviving`); and the iterate with the window and the curvature that they
+    found. What a step costs is no reason to refuse it: the first one after more stiffness is asked for costs
+    much, which the next one gets back."""
     solver, point = search.solver, it.point
     it = replace(it, point=trial)
     for _ in range(min(solver.repairs, search.left())):
         model = search.models.at(it.point)
-        y, _ = propose(task(search, it, model))
+        y, _ = propose(task(search, it, model, reviving=reviving))
         better, it = attempt(search, it, model, y)
         if better is None or merit(search, better) >= merit(search, it.point):
             it = replace(it, window=it.window * solver.shrink)

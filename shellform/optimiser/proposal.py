@@ -52,6 +52,7 @@ class Task(Record):
     - `groups` (c,): of cables alike, None where none are.
     - `excess` (k,): of the constraints over their linear model in a whole window.
     - `aims`: how many of the constraints' values, the last ones, are of structures in mind.
+    - `reviving`: whether cables that aren't `tensioned` may come back.
     """
 
     solver: SequentialConvex
@@ -66,6 +67,7 @@ class Task(Record):
     excess: Reals
     least: float
     aims: int
+    reviving: bool
 
 
 class Asked(NamedTuple):
@@ -357,4 +359,6 @@ def _box(task: Task) -> tuple[Reals, Reals]:
         upper[:count] = np.minimum(upper[:count], part.upper)
     if count:
         lower[:count] = np.where(task.tensioned, task.least, 0.0)
+        if not task.reviving:
+            upper[:count] = np.where(task.tensioned, upper[:count], 0.0)
     return lower, upper

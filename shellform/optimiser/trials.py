@@ -37,8 +37,8 @@ _SAME = 1e-6  # relative: violations in two states of one equilibrium
 _COARSE = 0.5  # the first load step of a search for the end of a branch
 
 
-def task(search: Search, it: Iterate, model: StepModel) -> Task:
-    """What the next step is asked for."""
+def task(search: Search, it: Iterate, model: StepModel, *, reviving: bool = True) -> Task:
+    """What the next step is asked for, in which cables that don't pull may come back (`reviving`)."""
     return Task(
         solver=search.solver,
         model=model,
@@ -52,6 +52,7 @@ def task(search: Search, it: Iterate, model: StepModel) -> Task:
         excess=it.excess * it.window**2,
         least=max(search.least if it.phase == "thin" else 0.0, search.solver.least_tension * search.tension),
         aims=in_mind(search),
+        reviving=reviving,
     )
 
 

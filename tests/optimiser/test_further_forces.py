@@ -67,3 +67,16 @@ def test_a_wide_step_keeps_the_limit_under_another_load_whatever_cables_come_to_
     before, after = (each.constraints[-1] for each in (without, trial))
     assert before > 0.02
     assert after < 0.2 * before
+
+
+def test_cables_that_went_do_not_come_back_in_a_step_that_revives_none(started):
+    search, it = started
+    model = search.models.at(it.point)
+    pulling = np.arange(model.tensions) % 3 > 0
+    asked = task(search, replace(it, tensioned=pulling), model)
+    assert asked.reviving
+    y, _ = propose(asked)
+    assert (y[: model.tensions][~pulling] > 0.0).any()
+    gone, _ = propose(replace(asked, reviving=False, window=1e3 * search.tension))
+    np.testing.assert_array_equal(gone[: model.tensions][~pulling], 0.0)
+    assert (gone[: model.tensions][pulling] > 0.0).all()

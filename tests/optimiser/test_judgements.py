@@ -86,7 +86,7 @@ def bare(monkeypatch):
 
     for module in (descent, phases):
         monkeypatch.setattr(module, "tell", lambda *_: None)
-        monkeypatch.setattr(module, "task", lambda *_: None)
+        monkeypatch.setattr(module, "task", lambda *_, **__: None)
         monkeypatch.setattr(module, "propose", lambda *_: (None, told.predicted))
         monkeypatch.setattr(module, "attempt", attempted)
         monkeypatch.setattr(module, "accepted", took)
@@ -293,7 +293,8 @@ def test_while_cables_are_taken_away_only_those_that_pull_and_stay_are_kept_taut
     leaving, kept_taut = [np.array([1, 3]), np.array([2]), np.array([], dtype=int)], []
     without = [Point(0.9, "without two"), None]
 
-    def repaired(search, it, trial):
+    def repaired(search, it, trial, *, reviving):
+        assert not reviving
         kept_taut.append(it.tensioned.tolist())
         return trial, it
 

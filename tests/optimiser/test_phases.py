@@ -297,7 +297,8 @@ def thinning(monkeypatch):
         told.seen[-1] = (*told.seen[-1], budget)
         return (trial if told.go.pop(0) else None), replace(it, fell=told.fell)
 
-    def repaired(search, it, trial):
+    def repaired(search, it, trial, *, reviving):
+        assert not reviving, "what went stays away"
         told.repaired.append(trial)
         return trial, it
 
@@ -437,7 +438,7 @@ def test_after_a_repair_the_window_is_at_least_a_twentieth_of_a_mean_tension_and
     monkeypatch, window, after
 ):
     monkeypatch.setattr(phases, "propose", lambda *_: (None, 0.0))
-    monkeypatch.setattr(phases, "task", lambda *_: None)
+    monkeypatch.setattr(phases, "task", lambda *_, reviving: None)
     monkeypatch.setattr(phases, "attempt", lambda search, it, model, y: (None, it))
     search = searching(solver=sf.SequentialConvex(repairs=1))
     found, it = phases._repaired(search, iterate("before", window=window), "trial")

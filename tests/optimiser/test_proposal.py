@@ -182,6 +182,7 @@ def task_of(**changes):
         "excess": np.zeros(1),
         "least": 0.3,
         "aims": 0,
+        "reviving": True,
     }
     return SimpleNamespace(**{**given, **changes})
 
@@ -192,6 +193,7 @@ def test_tensions_are_bounded_by_the_least_that_cables_keep_and_the_most_that_ea
     assert (lower.tolist(), upper.tolist()) == ([0.3, 0.0, 0.05], [7.0, 6.0, 0.2])
     lower, upper = proposal._box(task_of())
     assert upper.tolist() == [9.0, 6.0, 0.2]
+    assert proposal._box(task_of(reviving=False))[1].tolist() == [9.0, 0.0, 0.2]
     none = model_of(tensions=0)
     assert proposal._box(task_of(model=none))[0].tolist() == [0.0, 0.0, 0.05]
     assert none.lower.tolist() == [0.0, 0.0, 0.05], "the model's own stay"
