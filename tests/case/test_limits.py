@@ -224,12 +224,9 @@ def test_wrong_entries_of_limits_and_scatter_are_named(settings, said):
 )
 def test_thinning_keeps_the_shape_that_is_asked_for_and_what_is_required_in_any_case(settings, kept):
     assert _solver(load_case(CASE, settings)).deviation == kept
-    free = load_case(ROOT / "scripts/scale_model_radius.toml")
-    assert _solver(free).deviation is None
-    assert (
-        _solver(load_case(ROOT / "scripts/scale_model_radius.toml", ["limits.deviation=0.002"])).deviation
-        == 0.002
-    )
+    free = ROOT / "scripts/full_size.toml"
+    assert _solver(load_case(free)).deviation is None
+    assert _solver(load_case(free, ["limits.deviation=0.02"])).deviation == 0.02
 
 
 def test_limits_that_can_t_be_are_refused_when_the_problem_is_made(shell, loads):
