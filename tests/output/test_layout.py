@@ -40,9 +40,10 @@ def built():
         node_count=len(GRID.flat),
         cable_ends=ends,
         rod=SimpleNamespace(section=Round(0.01, Material(40e9, 15e9))),
+        cables=lambda design: SimpleNamespace(tension=lambda state: np.array([3.0, 0.0])),
     )
     design = SimpleNamespace(present=np.array([True, True, False]), radius=0.01)
-    return SimpleNamespace(grid=GRID, shell=shell, design=design)
+    return SimpleNamespace(grid=GRID, shell=shell, design=design, states={"none": None})
 
 
 def on(marks, layer, kind):
