@@ -37,6 +37,7 @@ from shellform.optimiser.search_state import (
     restiffened,
     stiffness_of,
     taut_count,
+    tensions,
     violation,
 )
 from shellform.optimiser.step_model import StepModel
@@ -49,10 +50,13 @@ from shellform.optimiser.trials import (
     standing,
     task,
 )
+from shellform.problem.constraints import residuals
+from shellform.problem.engineering import LargestCableForce
 from shellform.problem.evaluation import Evaluated
 
 _STIFFER = 0.01  # of the stiffness: less is no gain
 _SAME = 1e-6  # relative: stiffnesses that count as equal
+_AT_LIMIT = 0.02  # of a cable's limit: what is no farther below it counts as at it
 
 
 def run(search: Search, it: Iterate) -> Iterate:
@@ -201,10 +205,11 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     """Takes away cables that the shell can do without (thinning.py), in batches, and lets the others make up
     for them.
 
-    Those left are kept taut while their tensions are optimised again, and those that went don't come back,
-    unless more stiffness is asked for; where designs are judged as built only if it takes that to keep the
-    limits. A batch that the shell doesn't bear, that breaks a limit more than
-    before, or that costs too much of the objective, is cut; a single cable that can't go is kept for good.
+    Those left are kept taut while their tensions are optimised again; where designs are judged as built only
+    if it takes that to keep the limits. Where cables pull what they may, those that went would come back to
+    help them: none does unless more stiffness is asked for. A batch that the shell doesn't bear, that breaks
+    a limit more than before, or that costs too much of the objective, is cut; a single cable that can't go is
+    kept for good.
     """
     solver = search.solver
     most = solver.most_cables
@@ -231,7 +236,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         # made a design stand
         if found is None and not it.fell and trial is not None:
             if trial.objective < worse(budget.objective, 1.0):
-                trial, it = _repaired(search, it, trial, reviving=False)
+                trial, it = _repaired(search, it, trial, reviving=not _at_force_limit(search, it.point))
             found, it = _made_to_stand(search, it, trial, budget)
         if found is None:
             it = noted(search, it, trial or it.point, False)
@@ -256,6 +261,18 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     if most is not None and taut_count(search, it.point) > most:
         status += f"; no design with {most} cables was found that keeps every limit"
     return replace(it, status=status)
+
+
+def _at_force_limit(search: Search, point: Evaluated) -> bool:
+    """Whether a cable pulls what it may under some load."""
+    problem, most = search.evaluator.problem, np.array([tensions(search, point).max(initial=0.0)])
+    shares = [float(residuals(part, most)[0]) for part in search.bounded]
+    shares += [
+        float(point.constraints[own].max())
+        for part, own in zip(problem.constraints, problem.places(), strict=True)
+        if isinstance(part.term, LargestCableForce)
+    ]
+    return max(shares, default=-np.inf) > -_AT_LIMIT
 
 
 def _without_slack(search: Search, it: Iterate) -> Iterate:

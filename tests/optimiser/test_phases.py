@@ -298,11 +298,12 @@ def thinning(monkeypatch):
         return (trial if told.go.pop(0) else None), replace(it, fell=told.fell)
 
     def repaired(search, it, trial, *, reviving):
-        assert not reviving, "what went stays away"
+        assert reviving is not told.at_limit, "at their limit cables would get help from those that went"
         told.repaired.append(trial)
         return trial, it
 
-    told.fell, told.trial = False, SimpleNamespace(objective=0.5)
+    told.fell, told.trial, told.at_limit = False, SimpleNamespace(objective=0.5), False
+    monkeypatch.setattr(phases, "_at_force_limit", lambda *_: told.at_limit)
     monkeypatch.setattr(phases, "pausing", lambda *_: False)
     monkeypatch.setattr(phases, "_without_slack", lambda search, it: it)
     monkeypatch.setattr(phases, "tell", lambda *_: None)
