@@ -29,6 +29,7 @@ _TINY = -1e-300  # a predicted change that isn't one
 # of the objective, gained since cables were last let go slack, for which they are let again where thinning is
 # to end with what stands
 _WORTH_LETTING_GO = 0.05
+_IDLE = 2  # accepted steps in a row that gain next to nothing, after which thinning makes more of the rest
 _BACK = 1 / 16, 1 / 4  # of the way to a design that keeps every limit, by which one goes back that breaks one
 
 
@@ -96,12 +97,13 @@ def _rounds(search: Search, it: Iterate, least: int) -> Iterate:
             it = replace(it, status=status)
             worth = solver.settled if search.asked is None else _WORTH_LETTING_GO
             gained_little = it.guarded and it.point.objective > worse(it.before, -worth)
-            idle = not it.guarded and it.point.objective == it.before  # guarded it would try the same again
+            # guarded it would try the same again
+            idle = not it.guarded and it.point.objective > worse(it.before, -solver.settled)
             # without further loads there are no guards
             if search.always_guarded or gained_little or idle or len(search.evaluator.problem.used()) == 1:
                 return it
             before = it.point.objective if it.guarded else it.before
-            it = replace(it, before=before, guarded=not it.guarded, window=search.first_window)
+            it = replace(it, before=before, guarded=not it.guarded, window=search.first_window, idle=0)
             continue
         trial, it = attempt(search, it, model, y)
         if trial is None or merit(search, trial) >= merit(search, it.point):
@@ -111,18 +113,24 @@ def _rounds(search: Search, it: Iterate, least: int) -> Iterate:
         ratio = (trial.objective - it.point.objective) / min(predicted, _TINY)
         grown = 1.0 if it.refused else solver.grow  # a window that was just refused isn't tried again at once
         factor = grown if ratio > solver.good else (solver.shrink if ratio < solver.poor else 1.0)
-        it = accepted(search, replace(it, window=it.window * factor, refused=False), trial)
+        gained = trial.objective < worse(it.point.objective, -solver.settled)
+        idle = it.idle + 1 if least and not gained and violation(search, trial) <= 0.0 else 0
+        it = accepted(search, replace(it, window=it.window * factor, refused=False, idle=idle), trial)
     return it
 
 
 def _settled(search: Search, it: Iterate, predicted: float) -> str:
-    """The criterion of convergence that the point meets, in words; empty where none is met."""
+    """The criterion of convergence that the point meets, in words; empty where none is met. A window times as
+    large gains so many times what is `predicted` for this one at the most: the model is convex."""
     solver = search.solver
     if it.stage < 1.0:
         return ""
     kept = violation(search, it.point) <= 0.0
-    if kept and -predicted < solver.settled * abs(it.point.objective) and it.window >= search.tension:
+    largest = max(search.tension / it.window, 1.0)
+    if kept and -predicted * largest < solver.settled * abs(it.point.objective):
         return f"the model predicts less than {solver.settled:.1%} improvement"
+    if kept and it.idle >= _IDLE:
+        return f"{_IDLE} steps in a row improved it by less than {solver.settled:.1%} each"
     if it.window < solver.smallest * search.tension:
         return (
             "the objective has no better design within the smallest window"

@@ -126,6 +126,7 @@ class Iterate(Record):
 
     Descending:
     - `refused`: whether the last trial was; `before`: the objective when cables could last go slack.
+    - `idle`: accepted steps in a row that gained next to nothing.
 
     Thinning:
     - `thrifty`: the objective up to which cables are still taken away.
@@ -136,8 +137,8 @@ class Iterate(Record):
     - `fallen`: numbers of structures that have, the last ones first; `fell`: whether the last design has.
     - `samples`: fresh ones drawn so far.
     - `rested`: where the structures tried rest in the last design that stood, by the largest load of a path.
-    - `mind`: drawn structures that are to bear their loads, None where nothing but stiffness leads the
-      search; `remembered`: the design in which they were followed.
+    - `mind`: drawn structures that are to bear their loads, None where nothing but stiffness leads;
+      `remembered`: the design in which they were followed.
 
     Led by structures in mind:
     - `stood`, `begun`: how many designs were accepted when the last one stood, and when this turn began.
@@ -159,6 +160,7 @@ class Iterate(Record):
     status: str = "the number of evaluations was reached"
     phase: str = "climb"
     refused: bool = False
+    idle: int = 0
     before: float = float("inf")
     thrifty: float = 0.0
     batch: int = 0
@@ -278,8 +280,7 @@ def kept_in_mind(
 
 
 def stiffness_of(search: Search, point: Evaluated) -> float:
-    """What the softest modes keep under the further loads at the point, N/m; 0 where nothing is asked of
-    them, or where a mode is unstable."""
+    """What the softest modes keep under the further loads, N/m; 0 where none is asked, or one is unstable."""
     problem, count = search.evaluator.problem, len(search.inner.constraints)
     added = zip(problem.constraints[count:], problem.places()[count:], strict=True)
     # residuals are limit / scale - value / scale, value and limit squares
