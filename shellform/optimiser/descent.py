@@ -98,9 +98,9 @@ def _rounds(search: Search, it: Iterate, least: int) -> Iterate:
             worth = solver.settled if search.asked is None else _WORTH_LETTING_GO
             gained_little = it.guarded and it.point.objective > worse(it.before, -worth)
             # guarded it would try the same again
-            idle = not it.guarded and it.point.objective > worse(it.before, -solver.settled)
+            in_vain = not it.guarded and it.point.objective > worse(it.before, -solver.settled)
             # without further loads there are no guards
-            if search.always_guarded or gained_little or idle or len(search.evaluator.problem.used()) == 1:
+            if search.always_guarded or gained_little or in_vain or len(search.evaluator.problem.used()) == 1:
                 return it
             before = it.point.objective if it.guarded else it.before
             it = replace(it, before=before, guarded=not it.guarded, window=search.first_window, idle=0)

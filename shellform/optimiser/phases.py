@@ -37,7 +37,6 @@ from shellform.optimiser.search_state import (
     restiffened,
     stiffness_of,
     taut_count,
-    tensions,
     violation,
 )
 from shellform.optimiser.step_model import StepModel
@@ -50,13 +49,10 @@ from shellform.optimiser.trials import (
     standing,
     task,
 )
-from shellform.problem.constraints import residuals
-from shellform.problem.engineering import LargestCableForce
 from shellform.problem.evaluation import Evaluated
 
 _STIFFER = 0.01  # of the stiffness: less is no gain
 _SAME = 1e-6  # relative: stiffnesses that count as equal
-_AT_LIMIT = 0.02  # of a cable's limit: what is no farther below it counts as at it
 
 
 def run(search: Search, it: Iterate) -> Iterate:
@@ -206,8 +202,8 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     for them.
 
     Those left are kept taut while their tensions are optimised again; where designs are judged as built only
-    if it takes that to keep the limits. Where cables pull what they may, those that went would come back to
-    help them: none does unless more stiffness is asked for. A batch that the shell doesn't bear, that breaks
+    if it takes that to keep the limits. Those that went come back only where more stiffness is asked for:
+    else they would for a better shape than is asked for. A batch that the shell doesn't bear, that breaks
     a limit more than before, or that costs too much of the objective, is cut; a single cable that can't go is
     kept for good.
     """
@@ -236,7 +232,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         # made a design stand
         if found is None and not it.fell and trial is not None:
             if trial.objective < worse(budget.objective, 1.0):
-                trial, it = _repaired(search, it, trial, reviving=not _at_force_limit(search, it.point))
+                trial, it = _repaired(search, it, trial, reviving=False)
             found, it = _made_to_stand(search, it, trial, budget)
         if found is None:
             it = noted(search, it, trial or it.point, False)
@@ -261,18 +257,6 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     if most is not None and taut_count(search, it.point) > most:
         status += f"; no design with {most} cables was found that keeps every limit"
     return replace(it, status=status)
-
-
-def _at_force_limit(search: Search, point: Evaluated) -> bool:
-    """Whether a cable pulls what it may under some load."""
-    problem, most = search.evaluator.problem, np.array([tensions(search, point).max(initial=0.0)])
-    shares = [float(residuals(part, most)[0]) for part in search.bounded]
-    shares += [
-        float(point.constraints[own].max())
-        for part, own in zip(problem.constraints, problem.places(), strict=True)
-        if isinstance(part.term, LargestCableForce)
-    ]
-    return max(shares, default=-np.inf) > -_AT_LIMIT
 
 
 def _without_slack(search: Search, it: Iterate) -> Iterate:

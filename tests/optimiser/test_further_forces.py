@@ -9,7 +9,6 @@ import shellform as sf
 from shellform.optimiser import proposal
 from shellform.optimiser.further_forces import further_forces
 from shellform.optimiser.optimise import begin
-from shellform.optimiser.phases import _at_force_limit
 from shellform.optimiser.proposal import propose
 from shellform.optimiser.solver import SequentialConvex
 from shellform.optimiser.trials import attempt, task
@@ -81,26 +80,6 @@ def test_cables_that_went_do_not_come_back_in_a_step_that_revives_none(started):
     gone, _ = propose(replace(asked, reviving=False, window=1e3 * search.tension))
     np.testing.assert_array_equal(gone[: model.tensions][~pulling], 0.0)
     assert (gone[: model.tensions][pulling] > 0.0).all()
-
-
-def test_cables_are_at_their_limit_where_one_is_within_a_fiftieth_of_it_under_some_load(dome):
-    problem = misfit_and_force(dome, 2.0, most=200.0)
-    _, point = _begun(problem, dome)
-    ties = dome.cables(point.design)
-    base, further = (float(ties.tension(point.states[load]).max()) for load in ("wet", "wetter"))
-
-    def at_limit(under, beyond):
-        limits = [
-            sf.AtMost(under * base, sf.CableForces("wet")),
-            sf.AtMost(beyond * further, LargestCableForce("wetter", beyond * further)),
-        ]
-        return _at_force_limit(*_begun(replace(problem, constraints=limits), dome))
-
-    assert not at_limit(1.1, 1.1)
-    assert at_limit(1.01, 1.1)
-    assert at_limit(1.1, 1.02), "the smooth value lies above the largest"
-    free = replace(problem, constraints=problem.constraints[1:])
-    assert not _at_force_limit(*_begun(free, dome))
 
 
 def _begun(problem, shell):

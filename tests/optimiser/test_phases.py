@@ -298,12 +298,11 @@ def thinning(monkeypatch):
         return (trial if told.go.pop(0) else None), replace(it, fell=told.fell)
 
     def repaired(search, it, trial, *, reviving):
-        assert reviving is not told.at_limit, "at their limit cables would get help from those that went"
+        assert not reviving, "those that are left would get help from those that went"
         told.repaired.append(trial)
         return trial, it
 
-    told.fell, told.trial, told.at_limit = False, SimpleNamespace(objective=0.5), False
-    monkeypatch.setattr(phases, "_at_force_limit", lambda *_: told.at_limit)
+    told.fell, told.trial = False, SimpleNamespace(objective=0.5)
     monkeypatch.setattr(phases, "pausing", lambda *_: False)
     monkeypatch.setattr(phases, "_without_slack", lambda search, it: it)
     monkeypatch.setattr(phases, "tell", lambda *_: None)
