@@ -20,6 +20,7 @@ from shellform.optimiser.search_state import (
     Search,
     accepted_design,
     merit,
+    missed,
     noted,
     violation,
 )
@@ -127,7 +128,8 @@ def _settled(search: Search, it: Iterate, predicted: float) -> str:
         return ""
     kept = violation(search, it.point) <= 0.0
     largest = max(search.tension / it.window, 1.0)
-    if kept and -predicted * largest < solver.settled * abs(it.point.objective):
+    borne = kept and missed(search, it.point) <= 0.0  # else steps are for what structures are to bear
+    if borne and -predicted * largest < solver.settled * abs(it.point.objective):
         return f"the model predicts less than {solver.settled:.1%} improvement"
     if kept and it.idle >= _IDLE:
         return f"{_IDLE} steps in a row improved it by less than {solver.settled:.1%} each"

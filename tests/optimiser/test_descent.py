@@ -108,8 +108,9 @@ def test_half_of_the_evaluations_left_to_thinning_are_kept_only_under_the_whole_
 @pytest.fixture
 def descending(monkeypatch):
     """Descents of one trial, whose objective is told."""
-    told = SimpleNamespace(predicted=-0.5, trial=None, broken=0.0)
+    told = SimpleNamespace(predicted=-0.5, trial=None, broken=0.0, missed=0.0)
     monkeypatch.setattr(descent, "violation", lambda *_: told.broken)
+    monkeypatch.setattr(descent, "missed", lambda *_: told.missed)
     monkeypatch.setattr(descent, "tell", lambda *_: None)
     monkeypatch.setattr(descent, "task", lambda *_: None)
     monkeypatch.setattr(descent, "merit", lambda search, point: point.objective)
@@ -221,6 +222,8 @@ def test_a_search_settles_by_shares_of_its_objective_and_of_mean_tensions(descen
     )
     assert "no better design within the smallest" in settled(-1.0, window=0.119)
     assert settled(-1.0, window=0.121) == ""
+    descending.missed = 0.1
+    assert settled(-0.39e-3, window=4.0) == "", "steps serve what structures are to bear"
     descending.broken = 0.1
     assert "breaks its limits less" in settled(-0.39e-3, window=0.119)
 
