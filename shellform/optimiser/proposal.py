@@ -16,7 +16,7 @@ kept in mind (minding.py), there are more constraints than MMA's dual comes to a
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +37,9 @@ _FEW = 8  # constraints, beyond which MMA's dual may not come to an end
 _DUAL = 100  # evaluations of a dual: those that end take fewer, and the answers of others aren't kept
 _KEPT = 1e-9  # of a constraint, by which MMA's answer may be worse than its start's
 _LET = 1e-3  # of the least tension, by which a cable that isn't guarded yet may fall below it
+_LIFTED = (
+    0.02  # of the objective, which is 1 at the start: what lifting cables to their least tension may cost
+)
 _NONE = 1e-3  # of the mean tension: less is none, which MMA leaves of cables that die
 
 
@@ -53,6 +56,7 @@ class Task(Record):
     - `excess` (k,): of the constraints over their linear model in a whole window.
     - `aims`: how many of the constraints' values, the last ones, are of structures in mind.
     - `reviving`: whether cables that aren't `tensioned` may come back.
+    - `lifting`: whether cables below their least tension have to rise to it; else they keep what they have.
     """
 
     solver: SequentialConvex
@@ -68,6 +72,7 @@ class Task(Record):
     least: float
     aims: int
     reviving: bool
+    lifting: bool = True
 
 
 class Asked(NamedTuple):
@@ -84,8 +89,18 @@ class Asked(NamedTuple):
 
 def propose(task: Task) -> tuple[Reals, float]:
     """The y (y,) of the model's optimum within the window, and the change of the objective that it
-    predicts.
+    predicts. Where lifting cables to their least tension costs more than that is worth, as of stiff strands
+    whose errors are worth more than they pull, they keep what they have.
     """
+    y, change = _optimum(task)
+    if change <= _LIFTED:
+        return y, change
+    kept, less = _optimum(replace(task, lifting=False))
+    return (kept, less) if change - less > _LIFTED else (y, change)
+
+
+def _optimum(task: Task) -> tuple[Reals, float]:
+    """The same, as the task says."""
     model = task.model
     count = model.tensions
     lower, upper = _box(task)
@@ -317,7 +332,8 @@ def _falls(task: Task, held: Guard, some: Indices, width: Reals) -> tuple[Reals,
     change of each (k,), N; and the share of that (k,) by which it has to rise, or may fall where negative."""
     falls = -task.model.answers.by_parameters(held.by_design(some)) * width
     scale = np.abs(falls).sum(axis=1)
-    return falls, scale, np.minimum((task.least - held.tension[some]) / scale, task.solver.recovery)
+    recovery = task.solver.recovery if task.lifting else 0.0
+    return falls, scale, np.minimum((task.least - held.tension[some]) / scale, recovery)
 
 
 def _exact_in_tension(slope: Reals, model: StepModel) -> Reals:
@@ -359,6 +375,8 @@ def _box(task: Task) -> tuple[Reals, Reals]:
         upper[:count] = np.minimum(upper[:count], part.upper)
     if count:
         lower[:count] = np.where(task.tensioned, task.least, 0.0)
+        if not task.lifting:
+            lower[:count] = np.minimum(lower[:count], model.origin[:count])
         if not task.reviving:
             upper[:count] = np.where(task.tensioned, upper[:count], 0.0)
     return lower, upper

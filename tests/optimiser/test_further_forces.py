@@ -82,6 +82,19 @@ def test_cables_that_went_do_not_come_back_in_a_step_that_revives_none(started):
     assert (gone[: model.tensions][pulling] > 0.0).all()
 
 
-def _begun(problem, shell):
-    search, it = begin(problem, shell.design(), SequentialConvex(), lambda softest: 0.0, 10)
-    return search, it.point
+def test_cables_keep_what_they_have_where_rising_to_their_least_tension_costs_more_than_it_is_worth(started):
+    search, it = started
+    model = search.models.at(it.point)
+    count = model.tensions
+    asked = replace(task(search, it, model), tensioned=np.ones(count, dtype=bool))
+    low = model.origin[:count].min()
+    y, change = propose(replace(asked, least=1.1 * low))
+    assert change < 0.0
+    assert y[:count].min() > 1.09 * low, "what is cheap is done"
+    weak = replace(asked, least=20.0 * float(model.origin[:count].max()))
+    lifted, dear = proposal._optimum(weak)
+    assert (lifted[:count] > model.origin[:count]).all()
+    assert dear > proposal._LIFTED
+    y, change = propose(weak)
+    assert change <= 0.0
+    assert (y[:count] >= model.origin[:count] - 1e-9 * search.tension).all()

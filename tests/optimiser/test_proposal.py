@@ -183,6 +183,7 @@ def task_of(**changes):
         "least": 0.3,
         "aims": 0,
         "reviving": True,
+        "lifting": True,
     }
     return SimpleNamespace(**{**given, **changes})
 
@@ -194,6 +195,10 @@ def test_tensions_are_bounded_by_the_least_that_cables_keep_and_the_most_that_ea
     lower, upper = proposal._box(task_of())
     assert upper.tolist() == [9.0, 6.0, 0.2]
     assert proposal._box(task_of(reviving=False))[1].tolist() == [9.0, 0.0, 0.2]
+    both = np.array([True, True])
+    assert proposal._box(task_of(tensioned=both, least=0.7))[0].tolist() == [0.7, 0.7, 0.05]
+    kept = proposal._box(task_of(tensioned=both, least=0.7, lifting=False))
+    assert kept[0].tolist() == [0.7, 0.5, 0.05], "what is below it keeps what it has"
     none = model_of(tensions=0)
     assert proposal._box(task_of(model=none))[0].tolist() == [0.0, 0.0, 0.05]
     assert none.lower.tolist() == [0.0, 0.0, 0.05], "the model's own stay"
@@ -211,6 +216,9 @@ def test_a_guarded_cable_s_fall_is_told_in_what_a_whole_window_can_change_of_its
     assert scale == pytest.approx([1.5, 0.56])
     assert asked == pytest.approx([0.05 / 1.5, -0.6 / 0.56])
     assert proposal._falls(task_of(least=1.0), GUARD, np.array([0]), WIDTH)[2].tolist() == [0.1]
+    assert proposal._falls(task_of(least=1.0, lifting=False), GUARD, np.array([0]), WIDTH)[2].tolist() == [
+        0.0
+    ]
 
 
 def test_the_nearest_cables_are_guarded_that_a_step_could_let_go_slack():
@@ -325,7 +333,7 @@ def test_a_step_is_bounded_by_its_window_in_tensions_and_by_its_share_of_other_s
         point=SimpleNamespace(constraints=np.array([-0.4])), constraints_by_y=np.array([[1.0, -2.0, 5.0]])
     )
     task = task_of(model=model, excess=np.array([0.15]))
-    y, predicted = propose(task)
+    y, predicted = proposal._optimum(task)
     curvature, slope, rows, values, low, high = seen[0]
     assert slope == pytest.approx([1.0, 1.5, 1.0])
     assert rows == pytest.approx(np.array([[0.5, -1.0, 0.05]]))
@@ -340,31 +348,31 @@ def test_a_step_is_bounded_by_its_window_in_tensions_and_by_its_share_of_other_s
     assert told is rows or told == pytest.approx(rows)
     u = np.array([0.5, -0.999, 1.0])
     assert predicted == pytest.approx(slope @ u + 0.5 * u @ curvature @ u)
-    propose(task_of(model=model, window=6.0))
+    proposal._optimum(task_of(model=model, window=6.0))
     low, high = seen[1][4:]
     assert low == pytest.approx([(0.3 - 2.0) / 6.0, -0.5 / 6.0, -1.0])
     assert high == pytest.approx([1.0, 5.5 / 6.0, 1.0]), "and no more than its whole step"
     model.origin = np.array([-0.4, 0.5, 0.1])
-    propose(task_of(model=model))
+    proposal._optimum(task_of(model=model))
     assert (seen[2][4][0], seen[2][5][0]) == (1.0, 1.0)
     model.origin = np.array([2.0, 0.503, 0.1])
     beyond = []
     monkeypatch.setattr(proposal, "minimise_quadratic", lambda *_: np.array([0.5, -1.0, 1.0]))
     monkeypatch.setattr(proposal, "_from_there", lambda evaluate, u, *_: beyond.append(u) or u)
-    assert propose(task_of(model=model))[0][1] == pytest.approx(0.003), "3 mN are some"
+    assert proposal._optimum(task_of(model=model))[0][1] == pytest.approx(0.003), "3 mN are some"
     assert len(beyond) == 1
-    propose(task_of(model=model, guards=[WholeGuard(np.array([9.0]), np.zeros((1, 2)) + 1e-9)]))
+    proposal._optimum(task_of(model=model, guards=[WholeGuard(np.array([9.0]), np.zeros((1, 2)) + 1e-9)]))
     many = model_of(point=SimpleNamespace(constraints=np.full(9, -0.4)), constraints_by_y=np.ones((9, 3)))
-    propose(task_of(model=many, excess=np.zeros(9)))
+    proposal._optimum(task_of(model=many, excess=np.zeros(9)))
     assert len(beyond) == 1, "MMA doesn't go on with guards, nor with more than eight constraints"
     few = model_of(point=SimpleNamespace(constraints=np.full(8, -0.4)), constraints_by_y=np.ones((8, 3)))
-    propose(task_of(model=few, excess=np.zeros(8)))
+    proposal._optimum(task_of(model=few, excess=np.zeros(8)))
     assert len(beyond) == 2
     model.origin = np.array([2.0, 0.5, 0.1])
     monkeypatch.setattr(proposal, "minimise_quadratic", quadratic)
     grouped = task_of(model=model, groups=np.array([0, 1]))
     monkeypatch.setattr(proposal, "_equal_steps", lambda *_: np.array([0.0, -0.999, 0.0]))
-    assert propose(grouped)[0][1] == pytest.approx(0.0005), "of cables alike none goes alone"
+    assert proposal._optimum(grouped)[0][1] == pytest.approx(0.0005), "of cables alike none goes alone"
 
 
 @pytest.mark.parametrize(("near", "asked"), [(-0.9, [1]), (-0.8, [0, 1])])
