@@ -67,7 +67,7 @@ def attempt(search: Search, it: Iterate, model: StepModel, y: Reals) -> tuple[Ev
         rest[design.present] = averaged(rest[design.present], search.groups, every)
         design = replace(design, rest_length=rest)
     near = {**evaluator.predicted(it.point, design, but=search.base), search.base: model.predicted(y)}
-    trial = _on_branch(search, it, design, near, lead=not it.guarded)
+    trial = _on_branch(search, it, design, near)
     if trial is None:
         return None, it
     above = np.maximum(trial.constraints - model.constraints_at(y), 0.0) / it.window**2
@@ -93,14 +93,12 @@ def attempt_towards(search: Search, it: Iterate, other: Design, share: float) ->
     return _on_branch(search, it, design, search.evaluator.predicted(it.point, design))
 
 
-def _on_branch(
-    search: Search, it: Iterate, design: Design, near: Mapping[str, State], *, lead: bool = False
-) -> Evaluated | None:
-    """The design, rounded as it would be built, in the equilibria next to the states `near` it (Evaluator);
-    None where one of them leaves the stable branch."""
+def _on_branch(search: Search, it: Iterate, design: Design, near: Mapping[str, State]) -> Evaluated | None:
+    """The design, rounded as it would be built, in the equilibria next to the states `near` it, or to which
+    the further loads lead from there (Evaluator); None where one of them leaves the stable branch."""
     evaluator = search.evaluator
     try:
-        return evaluator.evaluate(evaluator.rounded(design), near, it.stage, lead=lead)
+        return evaluator.evaluate(evaluator.rounded(design), near, it.stage)
     except OffBranch:
         return None
 

@@ -81,8 +81,8 @@ class Tries:
     def rounded(self, design):
         return replace(design, radius=0.002)
 
-    def evaluate(self, design, near, stage, **how):
-        self.asked.append((design, near, stage, how))
+    def evaluate(self, design, near, stage):
+        self.asked.append((design, near, stage))
         if not self.constraints:
             raise OffBranch
         return SimpleNamespace(constraints=np.array(self.constraints))
@@ -110,17 +110,16 @@ def test_a_trial_shows_by_how_much_constraints_near_their_limits_exceed_their_mo
     trial, it = trials.attempt(search, iterate(), Model(), NONE)
     assert trial.constraints.tolist() == [0.2, -0.6, -0.3]
     assert it.excess == pytest.approx([2.5, 0.0, 0.0])
-    ((design, near, stage, how),) = search.evaluator.asked
+    ((design, near, stage),) = search.evaluator.asked
     assert near == {"wet": "predicted by the model", "wetter": "predicted under more"}
-    assert (design.radius, stage, how) == (0.002, 0.5, {"lead": True})
+    assert (design.radius, stage) == (0.002, 0.5)
     nearer = searching(evaluator=Tries(0.2, -0.49, -0.3))
     assert trials.attempt(nearer, iterate(), Model(), NONE)[1].excess == pytest.approx([2.5, 10.25, 0.0])
 
 
-def test_a_trial_that_is_off_the_branch_shows_nothing_and_guarded_none_is_led():
+def test_a_trial_that_is_off_the_branch_shows_nothing():
     search, it = searching(evaluator=Tries()), iterate(guarded=True)
     assert trials.attempt(search, it, Model(), NONE) == (None, it)
-    assert search.evaluator.asked[0][-1] == {"lead": False}
 
 
 def test_cables_of_a_group_are_tried_with_one_length():
@@ -133,7 +132,7 @@ def test_cables_that_leave_are_as_long_as_may_be_and_the_others_as_they_are():
     search = searching(evaluator=Tries(0.0))
     it = iterate(point=SimpleNamespace(design=Model().made, states="states"))
     assert trials.attempt_without(search, it, Model(), np.array([0, 2])) is not None
-    design, near, stage, _ = search.evaluator.asked[0]
+    design, near, stage = search.evaluator.asked[0]
     assert design.rest_length.tolist() == [1.5, 2.0, 3.0, 4.5]
     assert (near, stage) == ("states", 0.5)
     assert it.point.design.rest_length.tolist() == [1.0, 2.0, 3.0, 4.0]
