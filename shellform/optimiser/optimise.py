@@ -227,9 +227,8 @@ def _polished(
         minimise=_shape(best, solver),
         variables=cables or best.problem.variables,
     )
-    asked = best.asked
-    if asked is not None and asked.trusted:
-        asked = replace(asked, confirmed=None)
+    surer = None if best.asked is None else best.asked.surer()
+    asked = replace(surer, confirmed=None) if surer is not None and surer.trusted else surer
     alike = None if groups is None else np.unique(groups[best.design.present], return_inverse=True)[1]
     with dense_on_one():
         search, it = begin(
@@ -247,8 +246,8 @@ def _polished(
         every = np.ones_like(it.tensioned)
         it = replace(it, guarded=True, tensioned=every, fallen=best.fallen, rested=best.rested)
         it = as_borne(search, it, best.mind)
-        if best.asked is not None and it.mind is not None:
-            search = replace(finely(search, evaluations), asked=best.asked)
+        if surer is not None and it.mind is not None:
+            search = replace(finely(search, evaluations), asked=surer)
             it = replace(it, window=search.first_window)
         it = run(search, it)
         polished = finish(search, it)

@@ -57,25 +57,38 @@ class Demand:
       that is left to whoever judges what it finds.
     - `trusted`: whether errors are enlarged in trials as was asked for, so that what they confirm seldom
       falls later.
-    - `spare`: whether fewer may fall in a fresh sample than of a finished design's, for what was chosen among
+    - `spare`: how many fewer may fall in a fresh sample than of a finished design's: what was chosen among
       many is at the edge of falling.
     """
 
     trial: Required
     confirmed: Required | None
     trusted: bool = True
-    spare: bool = True
+    spare: int = _SPARE
 
     def sample(self, number: int) -> Required:
         """What is required of the fresh sample of this number."""
         fresh = self.confirmed
         assert fresh is not None
         fresh = replace(fresh, first=fresh.first + number * fresh.safety.tried)
-        return _sparing(fresh) if self.spare else fresh
+        return _sparing(fresh, self.spare) if self.spare else fresh
 
     def unspared(self) -> Demand:
         """The same where as many may fall in fresh samples as where a finished design is judged."""
-        return replace(self, spare=False)
+        return replace(self, spare=0)
+
+    def surer(self) -> Demand:
+        """The same with fresh samples twice as large as those that judge finished designs, of which fewer may
+        fall by a standard deviation of what may: for a design that may be left for the one before it."""
+        fresh = self.confirmed
+        if fresh is None:
+            return self
+        safety = replace(fresh.safety, tried=2 * fresh.safety.drawn)
+        larger = safety.tried / fresh.safety.tried
+        fallen = {name: int(larger * count) for name, count in fresh.fallen.items()}
+        may = may_fall(safety, fresh.design_load, fresh.design_load)
+        spare = max(_SPARE, int(np.sqrt(may)))
+        return replace(self, confirmed=replace(fresh, safety=safety, fallen=fallen), spare=spare)
 
     def after(self, samples: int) -> Demand:
         """The same for a search that comes after one that drew so many fresh samples."""
@@ -112,15 +125,15 @@ def critical_wanted(asked: Required, shares: Mapping[str, float]) -> float:
     return _MESH * asked.safety.critical_factor * shares[asked.design_load]
 
 
-def _sparing(asked: Required) -> Required:
-    """The same with one less that may fall than the probability allows. Where under a further load as many
-    may fall as of the start, fewer by a standard deviation of the difference of two such numbers."""
+def _sparing(asked: Required, spare: int) -> Required:
+    """The same with so many less that may fall than the probability allows; where under a further load as
+    many may as of the start, fewer by a standard deviation of the difference of two such numbers."""
     fallen = {}
     for name, count in asked.fallen.items():
         known = may_fall(asked.safety, name, asked.design_load)
         chance = np.sqrt(2.0 * count * (1.0 - count / asked.safety.tried))
         if count <= known:
-            fallen[name] = max(count - _SPARE, 0)
+            fallen[name] = max(count - spare, 0)
         else:
             fallen[name] = count if name == asked.design_load else max(int(count - chance), known)
     return replace(asked, fallen=fallen)

@@ -18,6 +18,7 @@ from shellform.problem.engineering import LeastTension
 from shellform.problem.problem import LoadCase, Problem
 from shellform.reliability.requirements import Demand
 from shellform.reliability.safety import Safety
+from tests.reliability.asked import asked_of
 
 LOAD = np.full((2, 6), -1.0)
 
@@ -312,16 +313,17 @@ def test_a_fresh_sample_judges_what_is_polished_with_structures_in_mind_or_where
     polishing, trusted
 ):
     polishing.end = optimum_of(objective=0.9)
-    asked = Demand("trial", "fresh", trusted)
-    best = optimum_of(asked=asked)
+    fresh = asked_of({"wet": 2, "wetter": 2}, tried=200, drawn=200, enlarged=1.0, probability_design=0.99)
+    best = optimum_of(asked=Demand("trial", fresh, trusted))
     polished_once(polishing, best)
     found = polishing.asked[0][-1]
-    assert (found.trial, found.confirmed, found.trusted) == ("trial", None if trusted else "fresh", trusted)
+    assert (found.trial, found.trusted) == ("trial", trusted)
+    assert found.confirmed is None if trusted else found.confirmed.safety.tried == 400
     assert polishing.ran[0][0].asked is found
     polishing.mind = "some"
     polished_once(polishing, best)
     search, it = polishing.ran[1]
-    assert (search.asked, it.window) == (asked, 0.01), "in fine steps"
+    assert (search.asked.confirmed.safety.tried, it.window) == (400, 0.01), "in fine steps"
     polished_once(polishing, replace(best, asked=None))
     assert polishing.ran[2][0].asked is None
 
