@@ -122,14 +122,16 @@ def _rounds(search: Search, it: Iterate, least: int) -> Iterate:
 
 def _settled(search: Search, it: Iterate, predicted: float) -> str:
     """The criterion of convergence that the point meets, in words; empty where none is met. A window times as
-    large gains so many times what is `predicted` for this one at the most: the model is convex."""
+    large gains so many times what is `predicted` for this one at the most, for the model is convex; but where
+    constraints are held at a distance for their curvature a smaller one may gain more."""
     solver = search.solver
     if it.stage < 1.0:
         return ""
     kept = violation(search, it.point) <= 0.0
     largest = max(search.tension / it.window, 1.0)
     borne = kept and missed(search, it.point) <= 0.0  # else steps are for what structures are to bear
-    if borne and -predicted * largest < solver.settled * abs(it.point.objective):
+    bounded = it.window >= search.tension or not it.excess.any()
+    if borne and bounded and -predicted * largest < solver.settled * abs(it.point.objective):
         return f"the model predicts less than {solver.settled:.1%} improvement"
     if kept and it.idle >= _IDLE:
         return f"{_IDLE} steps in a row improved it by less than {solver.settled:.1%} each"

@@ -222,6 +222,9 @@ def test_a_search_settles_by_shares_of_its_objective_and_of_mean_tensions(descen
     )
     assert "no better design within the smallest" in settled(-1.0, window=0.119)
     assert settled(-1.0, window=0.121) == ""
+    curved = np.array([0.0, 0.1])
+    assert settled(-0.19e-3, window=2.0, excess=curved) == "", "a smaller window may gain more"
+    assert "less than 0.1% improvement" in settled(-0.39e-3, window=4.0, excess=curved)
     descending.missed = 0.1
     assert settled(-0.39e-3, window=4.0) == "", "steps serve what structures are to bear"
     descending.broken = 0.1
