@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shellform.arrays import Reals
 from shellform.optimiser.going_back import within_limits
 from shellform.optimiser.optimum import worse
 from shellform.optimiser.proposal import propose
@@ -24,7 +25,9 @@ from shellform.optimiser.search_state import (
     noted,
     violation,
 )
+from shellform.optimiser.step_model import StepModel
 from shellform.optimiser.trials import accepted, attempt, attempt_towards, reach, staged, task
+from shellform.problem.problem import FEASIBLE
 
 _TINY = -1e-300  # a predicted change that isn't one
 # of the objective, gained since cables were last let go slack, for which they are let again where thinning is
@@ -93,7 +96,7 @@ def _rounds(search: Search, it: Iterate, least: int) -> Iterate:
         tell(search, it)
         model = search.models.at(it.point)
         y, predicted = propose(task(search, it, model))
-        status = _settled(search, it, predicted)
+        status = _settled(search, replace(it, excess=_binding(it, model, y)), predicted)
         if status:
             it = replace(it, status=status)
             worth = solver.settled if search.asked is None else _WORTH_LETTING_GO
@@ -118,6 +121,14 @@ def _rounds(search: Search, it: Iterate, least: int) -> Iterate:
         idle = it.idle + 1 if least and not gained and violation(search, trial) <= 0.0 else 0
         it = accepted(search, replace(it, window=it.window * factor, refused=False, idle=idle), trial)
     return it
+
+
+def _binding(it: Iterate, model: StepModel, y: Reals) -> Reals:
+    """The excess (k,) of those constraints alone that hold the step to y (y,) back by it."""
+    if not it.excess.any():
+        return it.excess
+    kept_off = it.excess * it.window**2
+    return np.where(model.constraints_at(y) + kept_off > -FEASIBLE, it.excess, 0.0)
 
 
 def _settled(search: Search, it: Iterate, predicted: float) -> str:

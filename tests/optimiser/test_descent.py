@@ -231,6 +231,16 @@ def test_a_search_settles_by_shares_of_its_objective_and_of_mean_tensions(descen
     assert "breaks its limits less" in settled(-0.39e-3, window=0.119)
 
 
+def test_only_constraints_that_hold_a_step_back_by_their_curvature_keep_a_search_from_settling():
+    """In a window of 0.5 their excess counts for a quarter."""
+    model = SimpleNamespace(constraints_at=lambda y: y)
+    it = iterate(window=0.5, excess=np.array([0.4, 0.4, 0.0]))
+    values = np.array([-0.1, -0.102, -1e-9])
+    assert descent._binding(it, model, values).tolist() == [0.4, 0.0, 0.0]
+    none = iterate()
+    assert descent._binding(none, None, values) is none.excess
+
+
 @pytest.mark.parametrize(("least", "spent"), [(1, 6), (0, 9)])
 def test_a_descent_that_leaves_evaluations_ends_once_two_steps_in_a_row_gain_next_to_nothing(
     descending, monkeypatch, least, spent
