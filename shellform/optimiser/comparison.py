@@ -88,7 +88,7 @@ class Plain:
             near = min(self.points, key=lambda point: float(np.linalg.norm(point.variables - variables)))
             try:
                 design = self.evaluator.blocks.design(np.array(variables), near.design.present)
-                found = self.evaluator.evaluate(design, near.states, 1.0)
+                found = self.evaluator.evaluate(design, near.states, 1.0, lead=True)
                 point, there = self.evaluator.linearised(found), True
             except OffBranch:
                 point, there = near, False

@@ -243,7 +243,7 @@ def _tried(search: _Search, x: Reals) -> _Told:
     near = min(search.near, key=lambda point: float(np.linalg.norm(point.variables - x)))
     try:
         design = evaluator.blocks.design(np.array(x), near.design.present)
-        point = evaluator.linearised(evaluator.evaluate(design, near.states, search.stage))
+        point = evaluator.linearised(evaluator.evaluate(design, near.states, search.stage, lead=True))
     except OffBranch:
         _note(search, near, False)
         return _as_told(search, x, near, np.inf)

@@ -202,10 +202,10 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     for them.
 
     Those left are kept taut while their tensions are optimised again; where designs are judged as built only
-    if it takes that to keep the limits. Those that went come back only where more stiffness is asked for:
-    else they would for a better shape than is asked for. A batch that the shell doesn't bear, that breaks
-    a limit more than before, or that costs too much of the objective, is cut; a single cable that can't go is
-    kept for good.
+    if it takes that to keep the limits. Those that went come back only where more stiffness is asked for or
+    structures lead: else they would for a better shape than is asked for. A batch that the shell doesn't
+    bear, that breaks a limit more than before, or that costs too much of the objective, is cut; a single
+    cable that can't go is kept for good.
     """
     solver = search.solver
     most = solver.most_cables
@@ -232,7 +232,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         # made a design stand
         if found is None and not it.fell and trial is not None:
             if trial.objective < worse(budget.objective, 1.0):
-                trial, it = _repaired(search, it, trial, reviving=False)
+                trial, it = _repaired(search, it, trial, reviving=it.mind is not None)
             found, it = _made_to_stand(search, it, trial, budget)
         if found is None:
             it = noted(search, it, trial or it.point, False)

@@ -93,7 +93,7 @@ def propose(task: Task) -> tuple[Reals, float]:
     whose errors are worth more than they pull, they keep what they have.
     """
     y, change = _optimum(task)
-    if change <= _LIFTED:
+    if change <= _LIFTED or task.aims:  # what structures are to bear may cost as much
         return y, change
     kept, less = _optimum(replace(task, lifting=False))
     return (kept, less) if change - less > _LIFTED else (y, change)

@@ -67,7 +67,7 @@ def attempt(search: Search, it: Iterate, model: StepModel, y: Reals) -> tuple[Ev
         rest[design.present] = averaged(rest[design.present], search.groups, every)
         design = replace(design, rest_length=rest)
     near = {**evaluator.predicted(it.point, design, but=search.base), search.base: model.predicted(y)}
-    trial = _on_branch(search, it, design, near)
+    trial = _on_branch(search, it, design, near, lead=_leads(it))
     if trial is None:
         return None, it
     above = np.maximum(trial.constraints - model.constraints_at(y), 0.0) / it.window**2
@@ -80,7 +80,7 @@ def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indi
     design = it.point.design
     rest = design.rest_length.copy()
     rest[np.flatnonzero(design.present)[leaving]] = model.longest[leaving]
-    return _on_branch(search, it, replace(design, rest_length=rest), it.point.states)
+    return _on_branch(search, it, replace(design, rest_length=rest), it.point.states, lead=_leads(it))
 
 
 def attempt_towards(search: Search, it: Iterate, other: Design, share: float) -> Evaluated | None:
@@ -93,12 +93,21 @@ def attempt_towards(search: Search, it: Iterate, other: Design, share: float) ->
     return _on_branch(search, it, design, search.evaluator.predicted(it.point, design))
 
 
-def _on_branch(search: Search, it: Iterate, design: Design, near: Mapping[str, State]) -> Evaluated | None:
+def _leads(it: Iterate) -> bool:
+    """Whether trials are led to further loads that Newton's method doesn't find from what is predicted: in
+    thinning, whose batches change much, and in descents without guards; not in steps as small as structures
+    in mind ask for."""
+    return it.mind is None and (it.phase == "thin" or not it.guarded)
+
+
+def _on_branch(
+    search: Search, it: Iterate, design: Design, near: Mapping[str, State], *, lead: bool = False
+) -> Evaluated | None:
     """The design, rounded as it would be built, in the equilibria next to the states `near` it, or to which
-    the further loads lead from there (Evaluator); None where one of them leaves the stable branch."""
+    the further loads `lead` (Evaluator); None where one of them leaves the stable branch."""
     evaluator = search.evaluator
     try:
-        return evaluator.evaluate(evaluator.rounded(design), near, it.stage)
+        return evaluator.evaluate(evaluator.rounded(design), near, it.stage, lead=lead)
     except OffBranch:
         return None
 

@@ -230,20 +230,25 @@ class Evaluator:
             constraints_by_variables=np.vstack([np.zeros((0, blocks.size)), *limited]),
         )
 
-    def evaluate(self, design: Design, near: Mapping[str, State], stage: float) -> Evaluated:
+    def evaluate(
+        self, design: Design, near: Mapping[str, State], stage: float, *, lead: bool = False
+    ) -> Evaluated:
         """The design's values in the equilibria that Newton's method finds from the states `near` them. Where
-        one of a further load isn't found from there, the load is followed from the design load's. Raises
-        OffBranch."""
+        one of a further load isn't found from there, with `lead` the load is followed from the design load's
+        equilibrium. Raises OffBranch."""
         self.evaluations += 1
         before = self.factorisations
         used = self.problem.used()
+        # The loads that a design may not bear first, so that giving up costs little; to lead, the design
+        # load's state is needed.
+        order = used if lead else tuple(reversed(used))
         try:
             found: dict[str, State] = {}
-            for name, tried in zip(used, self._tried(design, near, stage), strict=True):
+            for name, tried in zip(order, self._tried(design, near, stage, order, lead), strict=True):
                 self._count(tried.factorisations)
                 if tried.state is not None:
                     found[name] = tried.state
-                elif self.base in found:
+                elif lead and self.base in found:
                     found[name] = self._led(design, found[self.base], self.load(name, stage))
                 else:
                     raise OffBranch(tried.why)
@@ -286,24 +291,26 @@ class Evaluator:
         parts = (self.shell.beams(design.radius), self.shell.cables(design))
         return self._assemblies[number].with_parts(parts)
 
-    def _tried(self, design: Design, near: Mapping[str, State], stage: float) -> list[_Tried]:
-        """The equilibria under the loads that are used, sought side by side; those after the design load are
-        given up where they haven't begun and it has none."""
-        used = self.problem.used()
-        idle = [self.assembly(design, number) for number in range(min(cores(), len(used)))]
-        lost: list[str] = []
+    def _tried(
+        self, design: Design, near: Mapping[str, State], stage: float, order: Sequence[str], lead: bool
+    ) -> list[_Tried]:
+        """The equilibria under the loads in `order`, sought side by side; those after one that has none are
+        given up where they haven't begun, unless others are to `lead` to it. The first that has none is
+        always the same one, whichever is found first."""
+        idle = [self.assembly(design, number) for number in range(min(cores(), len(order)))]
+        lost: list[int] = []
 
-        def settled(name: str) -> _Tried:
-            if self.base in lost:
-                return _Tried(None, 0, "the design load wasn't borne")
-            own = idle.pop()
+        def settled(place: int) -> _Tried:
+            if any(each < place and (not lead or order[each] == self.base) for each in lost):
+                return _Tried(None, 0, "a load before it wasn't borne")
+            own, name = idle.pop(), order[place]
             found = self._settled(own, near[name], self.load(name, stage))
             idle.append(own)
             if found.state is None:
-                lost.append(name)
+                lost.append(place)
             return found
 
-        return side_by_side(settled, used)
+        return side_by_side(settled, range(len(order)))
 
     def _settled(self, assembly: Assembly, start: State, load: Reals) -> _Tried:
         """The stable equilibrium next to the state `start` under the `load`."""

@@ -298,7 +298,7 @@ def thinning(monkeypatch):
         return (trial if told.go.pop(0) else None), replace(it, fell=told.fell)
 
     def repaired(search, it, trial, *, reviving):
-        assert not reviving, "those that are left would get help from those that went"
+        assert reviving is (it.mind is not None), "else those that went would come back for the shape"
         told.repaired.append(trial)
         return trial, it
 

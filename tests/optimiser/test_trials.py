@@ -81,8 +81,8 @@ class Tries:
     def rounded(self, design):
         return replace(design, radius=0.002)
 
-    def evaluate(self, design, near, stage):
-        self.asked.append((design, near, stage))
+    def evaluate(self, design, near, stage, *, lead):
+        self.asked.append((design, near, stage, lead))
         if not self.constraints:
             raise OffBranch
         return SimpleNamespace(constraints=np.array(self.constraints))
@@ -110,9 +110,9 @@ def test_a_trial_shows_by_how_much_constraints_near_their_limits_exceed_their_mo
     trial, it = trials.attempt(search, iterate(), Model(), NONE)
     assert trial.constraints.tolist() == [0.2, -0.6, -0.3]
     assert it.excess == pytest.approx([2.5, 0.0, 0.0])
-    ((design, near, stage),) = search.evaluator.asked
+    ((design, near, stage, lead),) = search.evaluator.asked
     assert near == {"wet": "predicted by the model", "wetter": "predicted under more"}
-    assert (design.radius, stage) == (0.002, 0.5)
+    assert (design.radius, stage, lead) == (0.002, 0.5, True)
     nearer = searching(evaluator=Tries(0.2, -0.49, -0.3))
     assert trials.attempt(nearer, iterate(), Model(), NONE)[1].excess == pytest.approx([2.5, 10.25, 0.0])
 
@@ -120,6 +120,23 @@ def test_a_trial_shows_by_how_much_constraints_near_their_limits_exceed_their_mo
 def test_a_trial_that_is_off_the_branch_shows_nothing():
     search, it = searching(evaluator=Tries()), iterate(guarded=True)
     assert trials.attempt(search, it, Model(), NONE) == (None, it)
+
+
+@pytest.mark.parametrize(
+    ("changes", "led"),
+    [
+        ({"phase": "descend"}, True),
+        ({"phase": "descend", "guarded": True}, False),
+        ({"phase": "thin", "guarded": True}, True),
+        ({"phase": "thin", "guarded": True, "mind": "structures"}, False),
+    ],
+)
+def test_trials_are_led_to_further_loads_while_thinning_and_without_guards_but_not_by_structures(
+    changes, led
+):
+    search = searching(evaluator=Tries(0.0, 0.0, 0.0))
+    trials.attempt(search, iterate(**changes), Model(), NONE)
+    assert search.evaluator.asked[0][-1] is led
 
 
 def test_cables_of_a_group_are_tried_with_one_length():
@@ -132,7 +149,7 @@ def test_cables_that_leave_are_as_long_as_may_be_and_the_others_as_they_are():
     search = searching(evaluator=Tries(0.0))
     it = iterate(point=SimpleNamespace(design=Model().made, states="states"))
     assert trials.attempt_without(search, it, Model(), np.array([0, 2])) is not None
-    design, near, stage = search.evaluator.asked[0]
+    design, near, stage, _ = search.evaluator.asked[0]
     assert design.rest_length.tolist() == [1.5, 2.0, 3.0, 4.5]
     assert (near, stage) == ("states", 0.5)
     assert it.point.design.rest_length.tolist() == [1.0, 2.0, 3.0, 4.0]
