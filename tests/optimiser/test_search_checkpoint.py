@@ -114,7 +114,7 @@ def test_a_checkpoint_holds_every_field_of_where_a_search_stands(shell, problem)
         it,
         accepted=(Accepted(it.point.design, second, 0.125, 0.5), Accepted(thick, first, 0.25, 0.75)),
         history=(step,), stiffness=0.5 * search.softest, stage=0.75, window=0.375, margin=0.06, guarded=not it.guarded,
-        tensioned=second, excess=it.excess + 2.0, climbing=not it.climbing, status="said", phase="thin", refused=True,
+        tensioned=second, excess=it.excess + 2.0, climbing=not it.climbing, status="said", phase="thin", refused=True, idle=1,
         before=0.7, thrifty=0.3, batch=5, failures=2, needed=first, counted=90, paused=True, fallen=(3, 1), fell=True, stood=2, led_to=0.6, until=9, begun=4, samples=3,
     )  # fmt: skip
     fresh = {each.name: getattr(it, each.name) for each in fields(it)}
