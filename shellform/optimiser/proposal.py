@@ -37,9 +37,7 @@ _FEW = 8  # constraints, beyond which MMA's dual may not come to an end
 _DUAL = 100  # evaluations of a dual: those that end take fewer, and the answers of others aren't kept
 _KEPT = 1e-9  # of a constraint, by which MMA's answer may be worse than its start's
 _LET = 1e-3  # of the least tension, by which a cable that isn't guarded yet may fall below it
-_LIFTED = (
-    0.02  # of the objective, which is 1 at the start: what lifting cables to their least tension may cost
-)
+_LIFTED = 0.02  # of the objective at the start, 1: what lifting cables to their least tension may cost
 _NONE = 1e-3  # of the mean tension: less is none, which MMA leaves of cables that die
 
 
