@@ -36,11 +36,11 @@ cables that are left keep a tension that errors don't use up.
 
 A limit that the start breaks stops neither: no batch may break it more.
 
-The search ends where the model predicts too little improvement in its largest window, where the smallest
-window has no better design, or where the evaluations are used up, and thinning after some single cables in a
-row that can't go; the status says which it was. At the end the cables without tension are taken away and the
-design is loaded along the documented path (settled.py); if it should not bear all loads there, the last
-accepted design that does is returned.
+The search ends where the model predicts too little improvement in its largest window, where steps gain next
+to nothing, where the smallest window has no better design, or where the evaluations are used up, and thinning
+after some single cables in a row that can't go; the status says which it was. At the end the cables without
+tension are taken away and the design is loaded along the documented path (settled.py); if it should not bear
+all loads there, the last accepted design that does is returned.
 """
 
 from __future__ import annotations
@@ -171,9 +171,10 @@ def polish(
     shape alone. Where a node is farther off than the solver's `deviation`, half of the objective is the
     farthest nodes' (terms.py: Bulges). The objective never rises: where no better design is found, `best`
     comes back. Drawn structures that the search for `best` kept in mind bear what they did, as far as they
-    have to, and a fresh sample judges; else what was asked of `best` as built in trials is asked of the
-    polished design, and whether it stands as often is left to whoever judges it, but where trials know no
-    enlarged errors. Only the cables' lengths are varied, where they are variables of their own.
+    have to, and fresh samples judge that are larger than its own; else what was asked of `best` as built in
+    trials is asked of the polished design, and whether it stands as often is left to whoever judges it, but
+    where trials know no enlarged errors. Only the cables' lengths are varied, where they are variables of
+    their own.
 
     Where structures are kept in mind and evaluations are left, it is polished again from there, with what
     they bear measured anew, as long as that gains something and brings no node beyond the `deviation`; the

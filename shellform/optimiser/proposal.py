@@ -91,10 +91,18 @@ def propose(task: Task) -> tuple[Reals, float]:
     whose errors are worth more than they pull, they keep what they have.
     """
     y, change = _optimum(task)
-    if change <= _LIFTED or task.aims:  # what structures are to bear may cost as much
+    # what structures are to bear may cost as much
+    if change <= _LIFTED or task.aims or not _lifts(task):
         return y, change
     kept, less = _optimum(replace(task, lifting=False))
     return (kept, less) if change - less > _LIFTED else (y, change)
+
+
+def _lifts(task: Task) -> bool:
+    """Whether a cable that is to keep its least tension has less, so that the task has it rise."""
+    own = task.model.origin[: task.model.tensions]
+    below = task.tensioned[: len(own)] & (own < task.least)
+    return bool(below.any()) or any(bool((held.tension < task.least).any()) for held in task.guards)
 
 
 def _optimum(task: Task) -> tuple[Reals, float]:

@@ -1,6 +1,7 @@
 """Steps keep limits on cable forces under loads beside the design load."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -98,3 +99,18 @@ def test_cables_keep_what_they_have_where_rising_to_their_least_tension_costs_mo
     y, change = propose(weak)
     assert change <= 0.0
     assert (y[:count] >= model.origin[:count] - 1e-9 * search.tension).all()
+
+
+def test_a_step_in_which_no_cable_has_to_rise_is_solved_for_once_whatever_it_costs(started, monkeypatch):
+    search, it = started
+    asked = task(search, it, search.models.at(it.point))
+    pulling = np.ones(asked.model.tensions, dtype=bool)
+    solved = []
+    monkeypatch.setattr(proposal, "_optimum", lambda given: solved.append(given.lifting) or ("y", 1.0))
+    assert propose(replace(asked, tensioned=pulling, least=0.0)) == ("y", 1.0)
+    assert solved == [True]
+    propose(replace(asked, tensioned=pulling, least=1e6))
+    assert solved == [True, True, False]
+    guard = replace(asked, tensioned=~pulling, least=2.0, guards=[SimpleNamespace(tension=np.array([1.0]))])
+    propose(guard)
+    assert solved == [True, True, False, True, False]

@@ -94,7 +94,7 @@ def test_a_step_by_solves_is_the_step_by_dense_matrices(shell, guarded):
 
 
 def test_a_search_by_solves_ends_with_a_design_as_good(shell):
-    """Before cables are taken away; after that fewer may be left for more of the objective."""
+    """Before cables are taken away; after that fewer may be left for a little more of the objective."""
     for thin in (False, True):
         found = [
             sf.optimise(
@@ -108,7 +108,7 @@ def test_a_search_by_solves_ends_with_a_design_as_good(shell):
         for each in found:
             assert max(each.constraints.values()) <= sf.FEASIBLE
         fewer = found[0].design.present.sum() < found[1].design.present.sum()
-        assert (fewer and thin) or found[0].objective < 1.02 * found[1].objective
+        assert found[0].objective < (1.05 if fewer and thin else 1.02) * found[1].objective
 
 
 def test_a_search_by_solves_needs_no_constraint(shell):
