@@ -129,7 +129,12 @@ def tell_as_built(summary: Summary) -> None:
         for load, row in design.loads.items():
             parts = []
             if row.critical_factor is not None and row.critical_kind is not None:
-                end = critical_words(row.critical_factor, row.critical_kind, row.critical_factor_error)
+                end = critical_words(
+                    row.critical_factor,
+                    row.critical_kind,
+                    row.critical_factor_error,
+                    row.critical_factor_halved,
+                )
                 parts.append(f"critical factor {end}")
             if row.stands is not None:
                 own = row.stands

@@ -12,6 +12,7 @@ from shellform.records.raising import SCAFFOLD, WayUpRecord, easiest
 from shellform.records.summary import DesignRecord, StandingRecord, Summary
 
 _SPENT = 1.25  # times the initial design's deviation as built, from which on it is worth a word
+_SAME = 1e-6  # relative: factors that count as equal
 _LISTED = 8  # names, where there are more of them
 LOADS = {"none": "no load", "design": "the design load", "additional": "the additional load"}
 TITLES = {
@@ -260,8 +261,16 @@ def rare_words(found: RareRecord) -> str:
     )
 
 
-def critical_words(factor: float, kind: str, error: float | None = None) -> str:
-    """Where a path ends, and how far that is off by the mesh where it is known."""
+def critical_words(factor: float, kind: str, error: float | None = None, halved: float | None = None) -> str:
+    """Where a path ends, and how far that is off by the mesh where it is known; where it doesn't end, but
+    does with rod elements `halved`, at which factor."""
     if kind == "none":
-        return f"beyond {factor:.3g} ×"
+        return f"beyond {factor:.3g} ×{ends_halved(factor, halved)}"
     return f"{factor:.3f} × ({kind})" + ("" if error is None else f" ± {abs(error):.3f}")
+
+
+def ends_halved(factor: float, halved: float | None) -> str:
+    """That a path which doesn't end up to a factor does with rod elements halved; empty where it doesn't."""
+    if halved is None or halved >= factor * (1.0 - _SAME):
+        return ""
+    return f", but {halved:.3f} × with rod elements halved"

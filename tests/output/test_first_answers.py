@@ -147,6 +147,11 @@ def test_the_load_of_collapse_is_told_as_far_as_it_is_known(factor, kind, error,
     assert first_answers._collapse(None) == "At which load it collapses isn't known."
 
 
+def test_a_path_that_ends_with_rod_elements_halved_alone_is_not_told_as_stable_without_a_word():
+    row = replace(MORE, critical_factor=3.0, critical_kind="none", critical_factor_halved=1.4258)
+    assert first_answers._collapse(row).endswith("was tried, but 1.426 × with rod elements halved.")
+
+
 def test_the_error_of_a_collapse_load_is_told_without_its_sign():
     row = replace(MORE, critical_factor=2.5, critical_kind="limit point", critical_factor_error=-0.0312)
     assert first_answers._collapse(row).endswith(", by the mesh off by 0.031.")

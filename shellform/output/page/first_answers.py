@@ -24,6 +24,7 @@ from shellform.records.summary import DocumentsRecord, LoadRecord, Summary
 from shellform.records.words import (
     confidence_words,
     driven_words,
+    ends_halved,
     listed,
     load_title,
     raising_words,
@@ -282,7 +283,8 @@ def _collapse(row: LoadRecord | None) -> str:
     if row is None or row.critical_factor is None or row.critical_kind is None:
         return "At which load it collapses isn't known."
     if row.critical_kind == "none":
-        return f"Stable up to {row.critical_factor:.3g} × the design load, the most that was tried."
+        halved = ends_halved(row.critical_factor, row.critical_factor_halved)
+        return f"Stable up to {row.critical_factor:.3g} × the design load, the most that was tried{halved}."
     off = (
         ""
         if row.critical_factor_error is None
