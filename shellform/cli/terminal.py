@@ -134,6 +134,7 @@ def tell_as_built(summary: Summary) -> None:
                     row.critical_kind,
                     row.critical_factor_error,
                     row.critical_factor_halved,
+                    row.critical_snap_halved,
                 )
                 parts.append(f"critical factor {end}")
             if row.stands is not None:

@@ -198,7 +198,7 @@ def _stays(design: DesignRecord, load: str, least: float, rods: RodsOf) -> Cell:
     if row is None or row.critical_factor is None or row.critical_kind is None:
         return UNKNOWN
     fine, kept = row.critical_factor_halved, keeps_factor(row, least)
-    words = critical_words(row.critical_factor, row.critical_kind, halved=fine)
+    words = critical_words(row.critical_factor, row.critical_kind, halved=fine, snap=row.critical_snap_halved)
     if fine is not None and row.critical_kind != "none":
         words += f", {fine:.3f} × with rod elements halved"
     if kept is False:

@@ -115,8 +115,9 @@ class LoadRecord:
     down with, and `thrust_max`, N, sideways. `cable_force_max`, `cable_force_min`, N, and how many
     `cables_slack`. `critical_factor`: of this load, at which stability ends, by a point of `critical_kind`
     ("none": it doesn't up to `critical_sought`, the most that was tried), `critical_factor_halved` the same
-    with rod elements halved, and `critical_factor_error` what the coarser mesh is off by, as are
-    `deviation_max_error`, `deviation_mean_error`, m, and `rod_utilisation_error`. `slack`: cables without
+    with rod elements halved, where a local snap by `critical_snap_halved`, m, ends that path alone and the
+    structure bears on (None: no such one), and `critical_factor_error` what the coarser mesh is off by, as
+    are `deviation_max_error`, `deviation_mean_error`, m, and `rod_utilisation_error`. `slack`: cables without
     tension, by name; `stands` and, under the design load, `built_shape`: as built; `adjusted_shape`: the same
     structures of the design to build adjusted on site (reliability/adjusting.py); `expected_stiffness`, N/m:
     the least of the softest mode on the path to this load, cables counted for what they are worth under their
@@ -142,6 +143,7 @@ class LoadRecord:
     critical_factor: float | None = field(default=None, metadata={"beside": "critical_sought"})
     critical_factor_error: float | None = None
     critical_factor_halved: float | None = None
+    critical_snap_halved: float | None = None
     critical_kind: str | None = field(default=None, metadata={"beside": "critical_sought"})
     deviation_max_error: float | None = None
     deviation_mean_error: float | None = None
@@ -176,6 +178,7 @@ class LoadRecord:
             critical_factor=None,
             critical_factor_error=None,
             critical_factor_halved=None,
+            critical_snap_halved=None,
             critical_kind=None,
             deviation_max_error=None,
             deviation_mean_error=None,

@@ -261,16 +261,26 @@ def rare_words(found: RareRecord) -> str:
     )
 
 
-def critical_words(factor: float, kind: str, error: float | None = None, halved: float | None = None) -> str:
+def critical_words(
+    factor: float,
+    kind: str,
+    error: float | None = None,
+    halved: float | None = None,
+    snap: float | None = None,
+) -> str:
     """Where a path ends, and how far that is off by the mesh where it is known; where it doesn't end, but
-    does with rod elements `halved`, at which factor."""
+    does with rod elements `halved`, at which factor, and by a local `snap` of how many m if by one."""
     if kind == "none":
-        return f"beyond {factor:.3g} ×{ends_halved(factor, halved)}"
+        return f"beyond {factor:.3g} ×{ends_halved(factor, halved, snap)}"
     return f"{factor:.3f} × ({kind})" + ("" if error is None else f" ± {abs(error):.3f}")
 
 
-def ends_halved(factor: float, halved: float | None) -> str:
-    """That a path which doesn't end up to a factor does with rod elements halved; empty where it doesn't."""
+def ends_halved(factor: float, halved: float | None, snap: float | None = None) -> str:
+    """That a path which doesn't end up to a factor does with rod elements halved, and where that is a local
+    `snap`, m, that it bears on; empty where it doesn't."""
     if halved is None or halved >= factor * (1.0 - _SAME):
         return ""
-    return f", but {halved:.3f} × with rod elements halved"
+    told = f", but {halved:.3f} × with rod elements halved"
+    if snap is None:
+        return told
+    return f"{told}, where a rod's end or a cell snaps by {number(1e3 * snap, 2)} mm and it bears on"

@@ -177,6 +177,19 @@ class Loading(Branch):
         """As `followed` from nothing, but going on after local snaps, which are kept in `snaps`: where the
         structure falls."""
         here, factor = self.followed(most, step, smallest, marks=marks)
+        return self.beyond(here, factor, most, step, smallest, marks=marks)
+
+    def beyond(
+        self,
+        here: Here | None,
+        factor: float,
+        most: float,
+        step: float,
+        smallest: float,
+        *,
+        marks: Sequence[float] = (),
+    ) -> tuple[Here | None, float]:
+        """The same from the end of its branch on, `here` at the load `factor`."""
         while here is not None and factor < most and len(self.snaps) < SNAPS:
             goal = min(factor + _BEYOND * smallest, most)
             there = self._rested(here, goal)

@@ -18,8 +18,8 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import LOCK, locks_along, rod_bending_stress
 from shellform.gridshell.tolerances import Tolerances
 from shellform.net.grid import ROD
-from shellform.reliability.drawing import PERFECT, draw_errors
-from shellform.reliability.path_of_one import SOUGHT, Limit
+from shellform.reliability.drawing import PERFECT, Errors, draw_errors
+from shellform.reliability.path_of_one import BORNE, SOUGHT, UNLOADED, Limit, Snap
 from shellform.reliability.perfect import perfect_of
 from shellform.reliability.standing import Workshop
 from shellform.structure.answers.halved import Refined, cut_in_two, with_middles, with_nodes
@@ -37,13 +37,15 @@ _RESOLUTION = 1e-4  # of the load factor
 class MeshError:
     """`deviation_max` and `deviation_mean`, m, of the design's nodes from the target, `stress`, Pa, the
     largest bending stress of rods, `critical` the critical load factor; how the path ended on both meshes,
-    `kinds`."""
+    `kinds`. `snap`: where it ends with rod elements halved alone, the farthest of the local snaps there after
+    which the structure bears what was sought; None where it falls."""
 
     deviation_max: Refined
     deviation_mean: Refined
     stress: Refined
     critical: Refined
     kinds: tuple[str, str]
+    snap: Snap | None = None
 
 
 def mesh_error(shell: Gridshell, design: Design, load: Reals, *, sought: float = SOUGHT) -> MeshError:
@@ -59,6 +61,7 @@ def mesh_error(shell: Gridshell, design: Design, load: Reals, *, sought: float =
         stress=Refined(coarse.stress, fine.stress),
         critical=Refined(coarse.limit.factor, fine.limit.factor),
         kinds=(coarse.limit.kind, fine.limit.kind),
+        snap=_snap(fine, sought) if coarse.limit.kind == BORNE else None,
     )
 
 
@@ -113,20 +116,28 @@ def _limit(model: Model, sought: float, resolution: float) -> tuple[Workshop, Li
     """Where the perfect structure's path ends, and the workshop that has it."""
     nominal = perfect_of(model, _LOAD, shapes=0, step=_STEP)
     workshop = Workshop(nominal)
-    none = draw_errors(nominal.members, Tolerances(), 0, PERFECT)
     return workshop, workshop.limit(
-        none, most=sought, step=_STEP, resolution=resolution, begin=nominal.known_to(sought)
+        _no_errors(workshop),
+        most=sought,
+        step=_STEP,
+        resolution=resolution,
+        begin=nominal.known_to(sought),
     )
+
+
+def _no_errors(workshop: Workshop) -> Errors:
+    return draw_errors(workshop.nominal.members, Tolerances(), 0, PERFECT)
 
 
 @dataclass(frozen=True, eq=False)
 class _OnMesh:
-    """What one mesh says: as in `MeshError`, and where the path ends."""
+    """What one mesh says: as in `MeshError`, and where the path ends that the `workshop` followed."""
 
     deviation_max: float
     deviation_mean: float
     stress: float
     limit: Limit
+    workshop: Workshop
 
 
 def _on_mesh(model: Model, target: Reals, section: Section, sought: float) -> _OnMesh:
@@ -134,4 +145,13 @@ def _on_mesh(model: Model, target: Reals, section: Section, sought: float) -> _O
     state, beams = workshop.nominal.states[-1], model.network.beams
     away = np.linalg.norm(state.positions[: len(target)] - target, axis=1)
     stress = float(rod_bending_stress(section, beams, beams.local_forces(state)).max())
-    return _OnMesh(float(away.max()), float(away.mean()), stress, limit)
+    return _OnMesh(float(away.max()), float(away.mean()), stress, limit, workshop)
+
+
+def _snap(mesh: _OnMesh, sought: float) -> Snap | None:
+    """The farthest of the local snaps from the end of the mesh's path on, after which the structure bears
+    what is `sought`; None where it doesn't, or the path doesn't end."""
+    if mesh.limit.kind in (BORNE, UNLOADED):
+        return None
+    factor, snaps = mesh.workshop.beyond(_no_errors(mesh.workshop), mesh.limit, most=sought, step=_STEP)
+    return max(snaps, key=lambda each: each.far) if snaps and factor >= sought else None

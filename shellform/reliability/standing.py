@@ -29,12 +29,14 @@ from shellform.reliability.drawing import Errors, draw_errors
 from shellform.reliability.path_of_one import (
     BORNE,
     ENDED,
+    RESOLUTION,
     STEP,
     UNLOADED,
     Bench,
     DrawnOutcome,
     Limit,
     Loading,
+    Snap,
 )
 from shellform.reliability.perfect import Perfect, perfect
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
@@ -144,6 +146,18 @@ class Workshop:
         return self.with_structure(
             errors, lambda own: self._ended(own, own.borne(most, step, resolution), most, tell)
         )
+
+    def beyond(
+        self, errors: Errors, end: Limit, *, most: float, step: float = STEP, resolution: float = RESOLUTION
+    ) -> tuple[float, tuple[Snap, ...]]:
+        """Up to which load factor, `most` at the most, a structure goes on from the `end` of its stable
+        branch, and the local snaps on its way: where it falls there, that end's and none."""
+
+        def went_on(own: Loading) -> tuple[float, tuple[Snap, ...]]:
+            _, factor = own.beyond(own.at(end.state), end.factor, most, step, resolution)
+            return factor, tuple(own.snaps)
+
+        return self.with_structure(errors, went_on)
 
     def rests(
         self,

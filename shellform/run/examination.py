@@ -200,6 +200,7 @@ def _with_ends(
             critical_factor_halved=error.critical.fine / larger,
             critical_factor_error=error.critical.error / larger,
             critical_kind=error.kinds[0],
+            critical_snap_halved=None if error.snap is None else error.snap.far,
         )
     strength = each.shell.rod.strength
     ended[followed] = replace(

@@ -150,6 +150,8 @@ def test_the_load_of_collapse_is_told_as_far_as_it_is_known(factor, kind, error,
 def test_a_path_that_ends_with_rod_elements_halved_alone_is_not_told_as_stable_without_a_word():
     row = replace(MORE, critical_factor=3.0, critical_kind="none", critical_factor_halved=1.4258)
     assert first_answers._collapse(row).endswith("was tried, but 1.426 × with rod elements halved.")
+    snaps = replace(row, critical_snap_halved=0.0017)
+    assert first_answers._collapse(snaps).endswith("or a cell snaps by 1.7 mm and it bears on.")
 
 
 def test_the_error_of_a_collapse_load_is_told_without_its_sign():

@@ -689,6 +689,9 @@ def test_words_of_loads_paths_and_structures_keep_their_numbers():
     assert critical_words(3.0, "none", 0.0) == "beyond 3 ×"
     assert critical_words(3.0, "none", 0.0, 3.0) == "beyond 3 ×"
     assert critical_words(3.0, "none", 2.1, 1.4258) == "beyond 3 ×, but 1.426 × with rod elements halved"
+    assert critical_words(3.0, "none", 2.1, 1.4258, 0.00172) == (
+        "beyond 3 ×, but 1.426 × with rod elements halved, where a rod's end or a cell snaps by 1.7 mm and it bears on"
+    )
     assert critical_words(1.31, "limit point", -0.007) == "1.310 × (limit point) ± 0.007"
     assert critical_words(1.31, "bifurcation") == "1.310 × (bifurcation)"
     assert standing_words(StandingRecord(200, 199, 0.9769, 0.95, 0)) == (

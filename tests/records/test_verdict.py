@@ -184,6 +184,11 @@ def critical(factor, halved, kind="limit point"):
         (critical(1.2, 1.3), False, "1.200 × (limit point), 1.300 × with rod elements halved"),
         (critical(3.0, 3.0, "none"), True, "beyond 3 ×"),
         (critical(3.0, 1.426, "none"), True, "beyond 3 ×, but 1.426 × with rod elements halved"),
+        (
+            critical(3.0, 1.426, "none") | {"critical_snap_halved": 0.0017},
+            True,
+            "beyond 3 ×, but 1.426 × with rod elements halved, where a rod's end or a cell snaps by 1.7 mm and it bears on",
+        ),
         (critical(1.31, None), None, "1.310 × (limit point)"),
         ({"critical_kind": "not found: no path"}, None, "not known"),
     ],

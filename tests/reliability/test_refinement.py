@@ -8,8 +8,9 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability import refinement
 from shellform.reliability.failure import explained
-from shellform.reliability.path_of_one import BIFURCATION, BORNE, LIMIT_POINT
+from shellform.reliability.path_of_one import BIFURCATION, BORNE, LIMIT_POINT, Snap
 from shellform.reliability.perfect import perfect, perfect_of
 from shellform.reliability.refinement import critical_factor, critical_of, mesh_error, rods_halved
 from shellform.reliability.standing import Workshop
@@ -157,3 +158,36 @@ def test_a_fallen_structure_is_explained_by_what_it_would_bear_without_each_caus
 def test_a_structure_that_stands_has_no_failure_to_explain(nominal):
     with pytest.raises(InputError, match="hasn't fallen"):
         explained(Workshop(nominal), Tolerances(), seed=0, number=0)
+
+
+def test_a_snap_is_told_where_the_path_ends_with_rod_elements_halved_alone_and_the_structure_bears_on(
+    dome, nominal, monkeypatch
+):
+    """The ends of both paths and what comes beyond are told: that a real structure goes on so is tested
+    beside Workshop.beyond."""
+    real, asked = refinement._limit, []
+    snaps = (Snap(1.4, 0.001), Snap(1.6, 0.004))
+
+    def ends(kinds, beyond):
+        left = list(kinds)
+
+        def limit(model, sought, resolution):
+            workshop, end = real(model, 0.1, 0.05)
+            kind = left.pop(0)
+            return workshop, replace(end, kind=kind, factor=sought if kind == BORNE else 1.4)
+
+        def went_on(self, errors, end, *, most, step):
+            asked.append((end.factor, most))
+            return beyond
+
+        monkeypatch.setattr(refinement, "_limit", limit)
+        monkeypatch.setattr(Workshop, "beyond", went_on)
+        return mesh_error(dome, dome.design(), nominal.load, sought=2.0).snap
+
+    assert ends((BORNE, BIFURCATION), (2.0, snaps)) == snaps[1]
+    assert ends((BORNE, BIFURCATION), (1.9, snaps)) is None, "it falls before"
+    assert ends((BORNE, BIFURCATION), (1.4, ())) is None
+    assert asked == [(1.4, 2.0)] * 3
+    assert ends((BORNE, BORNE), (2.0, snaps)) is None
+    assert ends((LIMIT_POINT, BIFURCATION), (2.0, snaps)) is None
+    assert len(asked) == 3, "nobody looks where both paths end, or neither"

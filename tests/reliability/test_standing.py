@@ -18,6 +18,7 @@ from shellform.reliability.standing import Workshop, sample
 from shellform.structure.answers.analysis import analyse
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model, read_model, write_model
+from shellform.structure.solve.loading import SMALLEST
 
 LARGE = Tolerances(cable_length=3e-4, supports=3e-4, marks=3e-4, load_each=0.1, load_all=0.05, connectors=0.1)
 
@@ -308,6 +309,28 @@ def test_a_structure_of_which_one_spot_snaps_goes_on_and_ends_as_the_analysis_of
         assert told.converged
         assert told.equilibrium.stable
         assert each.state.positions == pytest.approx(told.equilibrium.state.positions, abs=1e-6)
+
+
+def test_beyond_the_end_of_its_path_a_structure_goes_on_as_from_nothing_or_falls_there(dome):
+    nominal = perfect(dome, dome.design(), dome.point_load(3.0, every=2))
+    coarse, workshop = Tolerances(marks=1e-3, supports=5e-4), Workshop(nominal)
+    goes_on, falls = 0, 0
+    for each in workshop.load_numbers(coarse, seed=1, numbers=range(16)):
+        if each.stands and not each.snaps:
+            continue
+        errors = drawn(nominal, coarse, each.number, seed=1)
+        end = workshop.limit(errors, most=1.0, resolution=SMALLEST)
+        factor, snaps = workshop.beyond(errors, end, most=1.0, resolution=SMALLEST)
+        if each.stands:
+            goes_on += 1
+            assert factor == 1.0
+            assert snaps[0].factor == end.factor
+            assert snaps[0].far == pytest.approx(each.snaps[0].far, rel=1e-3)
+        elif not each.snaps:
+            falls += 1
+            assert (factor, snaps) == (end.factor, ())
+    assert goes_on >= 2
+    assert falls >= 1
 
 
 def test_no_more_than_so_many_spots_may_snap_before_a_structure_counts_as_fallen(dome, monkeypatch):

@@ -78,6 +78,7 @@ def mesh_error(kind="limit point"):
         deviation_mean=number(0.0, 0.0, 0.002),
         stress=number(0.0, 0.0, 50.0),
         kinds=(kind, "bifurcation"),
+        snap=None if kind == "limit point" else SimpleNamespace(factor=1.5, far=0.0017),
     )
 
 
@@ -120,6 +121,9 @@ def test_what_one_path_tells_of_its_loads_is_counted_by_each_of_them(monkeypatch
         critical_factor_error=pytest.approx(0.104),
         critical_kind="limit point",
     )
+    monkeypatch.setattr(examination, "mesh_error", lambda *_, **__: mesh_error("none"))
+    snapping = examination._with_ends(rows, examined(), "design", {"additional": 1.0, "design": 0.8}, {})
+    assert [snapping[name].critical_snap_halved for name in ("design", "additional")] == [0.0017, 0.0017]
     endless = examination._with_ends(rows, examined(strength=np.inf), "design", {"design": 1.0}, {})
     assert endless["design"].rod_utilisation_error is None, "of rods whose strength isn't known"
 

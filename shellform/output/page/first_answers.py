@@ -283,7 +283,7 @@ def _collapse(row: LoadRecord | None) -> str:
     if row is None or row.critical_factor is None or row.critical_kind is None:
         return "At which load it collapses isn't known."
     if row.critical_kind == "none":
-        halved = ends_halved(row.critical_factor, row.critical_factor_halved)
+        halved = ends_halved(row.critical_factor, row.critical_factor_halved, row.critical_snap_halved)
         return f"Stable up to {row.critical_factor:.3g} × the design load, the most that was tried{halved}."
     off = (
         ""

@@ -41,6 +41,7 @@ _FOUND = {
     "rod_radius": Measure("radius of the rods", *_MM),
     "critical_factor": Measure("factor of the load at which stability ends"),
     "critical_factor_halved": Measure("factor at which stability ends with rod elements halved"),
+    "critical_snap_halved": Measure("local snap that ends the path with rod elements halved alone", *_MM),
     "critical_factor_error": Measure("what the mesh costs of the factor at which stability ends"),
     "expected_stiffness": Measure("stiffness of the softest mode as built", "N/m"),
     "drawn": Measure("structures drawn as built"),
