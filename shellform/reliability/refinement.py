@@ -54,14 +54,15 @@ def mesh_error(shell: Gridshell, design: Design, load: Reals, *, sought: float =
     section = shell.rod.resized(design.radius).section
     model = model_under(shell, design, load)
     coarse = _on_mesh(model, shell.target.positions, section, sought)
-    fine = _on_mesh(rods_halved(model), shell.target.positions, section, sought)
+    alone = coarse.limit.kind == BORNE
+    fine = _on_mesh(rods_halved(model), shell.target.positions, section, sought, going_on=alone)
     return MeshError(
         deviation_max=Refined(coarse.deviation_max, fine.deviation_max),
         deviation_mean=Refined(coarse.deviation_mean, fine.deviation_mean),
         stress=Refined(coarse.stress, fine.stress),
         critical=Refined(coarse.limit.factor, fine.limit.factor),
         kinds=(coarse.limit.kind, fine.limit.kind),
-        snap=_snap(fine, sought) if coarse.limit.kind == BORNE else None,
+        snap=fine.snap,
     )
 
 
@@ -131,27 +132,31 @@ def _no_errors(workshop: Workshop) -> Errors:
 
 @dataclass(frozen=True, eq=False)
 class _OnMesh:
-    """What one mesh says: as in `MeshError`, and where the path ends that the `workshop` followed."""
+    """What one mesh says: as in `MeshError`, and where the path ends."""
 
     deviation_max: float
     deviation_mean: float
     stress: float
     limit: Limit
-    workshop: Workshop
+    snap: Snap | None
 
 
-def _on_mesh(model: Model, target: Reals, section: Section, sought: float) -> _OnMesh:
+def _on_mesh(
+    model: Model, target: Reals, section: Section, sought: float, *, going_on: bool = False
+) -> _OnMesh:
+    """What the model says; `going_on`: beyond the end of its path too."""
     workshop, limit = _limit(model, sought, _RESOLUTION)
     state, beams = workshop.nominal.states[-1], model.network.beams
     away = np.linalg.norm(state.positions[: len(target)] - target, axis=1)
     stress = float(rod_bending_stress(section, beams, beams.local_forces(state)).max())
-    return _OnMesh(float(away.max()), float(away.mean()), stress, limit, workshop)
+    snap = _snap(workshop, limit, sought) if going_on else None
+    return _OnMesh(float(away.max()), float(away.mean()), stress, limit, snap)
 
 
-def _snap(mesh: _OnMesh, sought: float) -> Snap | None:
-    """The farthest of the local snaps from the end of the mesh's path on, after which the structure bears
-    what is `sought`; None where it doesn't, or the path doesn't end."""
-    if mesh.limit.kind in (BORNE, UNLOADED):
+def _snap(workshop: Workshop, end: Limit, sought: float) -> Snap | None:
+    """The farthest of the local snaps from the `end` of a path on, after which the structure bears what is
+    `sought`; None where it doesn't, or the path doesn't end."""
+    if end.kind in (BORNE, UNLOADED):
         return None
-    factor, snaps = mesh.workshop.beyond(_no_errors(mesh.workshop), mesh.limit, most=sought, step=_STEP)
+    factor, snaps = workshop.beyond(_no_errors(workshop), end, most=sought, step=_STEP)
     return max(snaps, key=lambda each: each.far) if snaps and factor >= sought else None
