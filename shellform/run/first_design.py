@@ -51,6 +51,7 @@ from shellform.run.next_trial import (
     stiffer_rods,
 )
 from shellform.run.sizes import (
+    BENT,
     MOST_CROSSINGS,
     DesignWish,
     Placed,
@@ -84,6 +85,7 @@ _SPACINGS = 3  # tried, one after the other
 _STEPS = 4  # sections tried on one net
 # where less stiff ones fell, deeper ones broke, and some lie between; two layers of thinner ones come before
 _NARROWED = 6
+_BENT_HARD = 0.9  # of the rods' strength, that bending takes where thin layers of concrete are tried too
 _TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyond it no others are tried
 Say = Callable[[str], None]
 
@@ -262,6 +264,7 @@ class _Search:
         else:
             tried, at = {}, first_choice(placed.net, self.surface, spacing, possible, needed)
         narrows = not more_come(possible[-1], self.layers)
+        bent = (_BENT_HARD if self.allowance.thin_layers else BENT) if narrows else 0.0
         while at not in tried:
             ended = len(tried) >= (_NARROWED if narrows and narrowed(possible, tried) else _STEPS)
             if tried and (ended or self.allowance.over):
@@ -270,7 +273,7 @@ class _Search:
             if isinstance(result, FirstDesign):
                 return result
             tried[at] = result
-            at = after(placed.net, possible, tried, last=narrows)
+            at = after(placed.net, possible, tried, bent=bent)
         return None
 
     def _nets(self, spacing: float, gap: float) -> list[Placed]:

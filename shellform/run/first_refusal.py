@@ -12,7 +12,7 @@ Of a shell that stands and strays too far as built walls are tried too, where ed
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -122,10 +122,10 @@ def _to_nearest(
     folder = _unused(output.with_name(f"{output.stem}-{BUILDABLE}"))
     tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
 
-    def nearest_of(shares: Iterable[float]) -> Nearest | None:
+    def nearest_of(shares: Sequence[float]) -> Nearest | None:
         return nearest_buildable(surface, refusal.radius, folder, again, say, shares, lambda: again.options)
 
-    nearest = nearest_of(again.in_turn(tried))
+    nearest = nearest_of(tried)
     if nearest is None and again.may_stand:
         again.go_on()
         nearest = nearest_of([again.best.share])
@@ -180,7 +180,6 @@ class _Rounded:
         self.too_late = False  # whether no work was left for even the first
         self.best = _Brief(0.0, wish, 0.0)
         self._thorough = False
-        self._share = 0.0
         self._begun = self._covered = False
         self._say = say
         self._whole = whole
@@ -195,17 +194,12 @@ class _Rounded:
 
     def go_on(self) -> None:
         """With finer spacings and thinner concrete."""
-        self._thorough, self._share = True, self.best.share
+        self._thorough = True
         self._brief = self._walled = self._whole.rest(1.0, thin_layers=True)
 
-    def in_turn(self, shares: Sequence[float]) -> Iterator[float]:
-        """The shares of the radius, each while its surface is tried."""
-        for share in shares:
-            self._share = share
-            yield share
-
-    def __call__(self, surface: Surface) -> None:
-        """Raises InputError or NotConverged where no design stands."""
+    def __call__(self, surface: Surface, share: float) -> None:
+        """Raises InputError or NotConverged where no design stands on the surface, rounded to such a share of
+        the radius."""
         self.too_late = not self._begun and self._brief.over
         self._begun = self._begun or not self.too_late
         plinths = plinths_for(surface)  # which whoever follows gets too
@@ -213,7 +207,7 @@ class _Rounded:
         wish = self.best.wish if self._thorough else self.wish
         how = "rounded, thoroughly" if self._thorough else "rounded"
         try:
-            self.design = self._tried(how, surface, wish, self._brief)
+            self.design = self._tried(how, surface, share, wish, self._brief)
         except (InputError, NotConverged) as error:
             covered = not (isinstance(error, Unbuildable) and error.why is Why.NET)
             self._covered = self._covered or covered
@@ -221,16 +215,18 @@ class _Rounded:
                 raise
             self._say(f"rounded: {error}")
             walls = replace(wish, edges="wall", angle=self._brief.angle)
-            self.design = self._tried(f"{how}, on walls", surface, walls, self._walled)
+            self.design = self._tried(f"{how}, on walls", surface, share, walls, self._walled)
 
-    def _tried(self, how: str, surface: Surface, wish: DesignWish, allowance: Allowance) -> FirstDesign:
+    def _tried(
+        self, how: str, surface: Surface, share: float, wish: DesignWish, allowance: Allowance
+    ) -> FirstDesign:
         """The design that stands with a wish; where none does, the trial may be the best."""
         allowance.bore, allowance.angle = 0.0, wish.angle
         try:
             design = _trial(how, surface, wish, allowance, self._say, finer=self._thorough)
         except (InputError, NotConverged):
             if allowance.bore > self.best.bore or self.best.bore == 0.0:
-                self.best = _Brief(self._share, replace(wish, angle=allowance.angle), allowance.bore)
+                self.best = _Brief(share, replace(wish, angle=allowance.angle), allowance.bore)
             raise
         if wish.edges != self.wish.edges:
             self.wish, self.options = replace(self.wish, edges=wish.edges), _WALLS

@@ -105,7 +105,7 @@ def stiffer_times(failure: Obstacle) -> float:
 
 
 def after(
-    net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle], *, last: bool = False
+    net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle], *, bent: float = 0.0
 ) -> int:
     """The section to try after the last of those `tried`; one of them where there is none.
 
@@ -114,13 +114,13 @@ def after(
     less deep than what broke least, by what its stress asks for, or by half the way there.
 
     What a shell is stressed to that lies on the ground says nothing of one that stands. So where that leaves
-    none, and these are the `last` layers, it is one as much stiffer as the fall asks for, if that leaves a
-    third of its strength to the load, or else the stiffest that does.
+    none, it is one as much stiffer as the fall asks for, if bending takes no more than a share `bent` of its
+    strength, or else the stiffest of such; with 0, where more layers come, none.
     """
     found, (at, failure) = _after(net, possible, tried), list(tried.items())[-1]
-    if found not in tried or not last or failure.why is not Why.STABILITY:
+    if found not in tried or not bent or failure.why is not Why.STABILITY:
         return found
-    return next_spare(net, possible, at, stiffer_times(failure))
+    return next_spare(net, possible, at, stiffer_times(failure), bent)
 
 
 def _after(net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]) -> int:

@@ -56,7 +56,7 @@ _BUCKLING = 1.4  # times √(EI GA) of a width and the squared curvature: the lo
 LEAST_PRESTRAIN, _MOST_PRESTRAIN = 0.001, 0.004  # of the cables
 _AMPLE = 2.0  # times what is needed, by the estimate of buckling: there the sections begin
 EDGES = ("auto", "wall")
-_BENT = 0.65  # of a rod's strength, that bending it into the net takes at the most of the first that is tried
+BENT = 0.65  # of a rod's strength, that bending it into the net takes at the most of the first that is tried
 
 
 @dataclass(frozen=True)
@@ -259,7 +259,7 @@ def first_choice(
     """Which of the `possible` sections to begin with, so that the grid buckles under `needed`, N/m², by the
     estimate: the least stiff that leaves a third of its strength to the load, or what comes nearest."""
     rope = rope_for(spacing)
-    spare = [k for k, each in enumerate(possible) if _bent(net, each) <= _BENT] or list(range(len(possible)))
+    spare = [k for k, each in enumerate(possible) if _bent(net, each) <= BENT] or list(range(len(possible)))
     enough = (
         k for k in spare if buckling_load(surface, spacing, possible[k].bending, rope) >= _AMPLE * needed
     )
@@ -284,10 +284,10 @@ def next_choice(
     return next((k for k in fit if possible[k].bending >= times * own.bending), fit[-1] if fit else at)
 
 
-def next_spare(net: Net, possible: Sequence[RodChoice], at: int, times: float) -> int:
-    """The least stiff of the sections that are at least so many `times` as stiff as that `at` and leave a
-    third of their strength to the load, else the stiffest that does; `at` where none is stiffer."""
-    spare = [k for k, each in enumerate(possible) if _bent(net, each) <= _BENT]
+def next_spare(net: Net, possible: Sequence[RodChoice], at: int, times: float, most: float) -> int:
+    """The least stiff of the sections that are at least so many `times` as stiff as that `at` and of whose
+    strength bending takes a share of `most`, else the stiffest of these; `at` where none is stiffer."""
+    spare = [k for k, each in enumerate(possible) if _bent(net, each) <= most]
     enough = (k for k in spare if possible[k].bending >= times * possible[at].bending)
     return max(next(enough, spare[-1] if spare else at), at)
 
@@ -343,7 +343,7 @@ def radius_for(surface: Surface, spacing: float, needed: float, wish: DesignWish
     fit = [each for n in layers for each in wished(wish.rod, n) if least_spacing(each) <= spacing]
     borne = {each: _without_creases(surface, spacing, each) for each in fit}
     for ample in (_AMPLE, 0.5 * _AMPLE, 0.25 * _AMPLE):  # the estimate is rough
-        enough = [bent_to(each) / _BENT for each in fit if borne[each] >= ample * needed]
+        enough = [bent_to(each) / BENT for each in fit if borne[each] >= ample * needed]
         if enough:
             return min(enough)
     return 0.0

@@ -7,7 +7,8 @@ surface as given. Beside it stands a map of the change.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,6 +27,7 @@ SURFACE = "surface.obj"
 BUILDABLE = "buildable"  # folder in a run's
 COVERED = 3.0  # spacings: a radius of curvature that nets cover
 MORE = (1.0, 1.5, 2.2)  # times the radius asked for
+_CLOSE = 1.1  # from one radius to the next, at the least
 _SLENDER = 1e-9  # m: less is no change
 _FAR_OFF = 0.2  # of a surface's height, in the mean
 
@@ -49,7 +51,7 @@ def with_way_out(
 ) -> InputError | NotConverged:
     """The refusal of a surface with the nearest buildable one, as `nearest_buildable` finds it, for its
     remedy; as it was, where none is found."""
-    nearest = nearest_buildable(surface, radius, folder, again, say)
+    nearest = nearest_buildable(surface, radius, folder, lambda rounded, _: again(rounded), say)
     return refusal if nearest is None else renewed(refusal, nearest.told)
 
 
@@ -57,33 +59,39 @@ def nearest_buildable(
     surface: Surface,
     radius: float,
     folder: Path,
-    again: Callable[[Surface], object],
+    again: Callable[[Surface, float], object],
     say: Callable[[str], None],
-    shares: Iterable[float] = MORE,
+    shares: Sequence[float] = MORE,
     options: Callable[[], str] = lambda: "",
 ) -> Nearest | None:
     """The nearest buildable surface, written into `folder` as surface.obj, surface.step, change.vtu and
     change.png; None where none is found.
 
-    `radius`, m, to which the surface must be rounded at least; `again` does with a surface what was refused
-    and raises InputError or NotConverged where it is refused again; `say` hears what is tried; `shares` of
-    the radius are, one after the other; `options` are those of the command with which `again` went on.
+    `radius`, m, to which the surface must be rounded at least; `shares` of it are tried, one after the other,
+    and where the surface can't be rounded to one, those between it and the one before; `again` does with a
+    surface rounded to a share what was refused and raises InputError or NotConverged where it is refused
+    again; `say` hears what is tried; `options` are those of the command with which `again` went on.
     """
     from shellform.surface.readers.meshes import write_mesh
 
-    for share in shares:
+    left, rounded = list(shares), 0.0
+    while left:
+        share, *left = left
         wanted = share * radius
         try:
             found = faired(surface, wanted)
         except (InputError, NotConverged) as error:
             say(f"rounded to {wanted:.3g} m: {error.what}")  # nobody asked for this radius: no remedy
-            break  # still rounder is still harder
+            between = math.sqrt(rounded * share)
+            left = [between] if between > _CLOSE * rounded > 0.0 else []  # still rounder is still harder
+            continue
+        rounded = share
         try:
             if float(found.change.max()) > _SLENDER:
                 with TemporaryDirectory() as place:
                     trial = Path(place) / SURFACE
                     write_mesh(trial, found.surface)
-                    again(read_surface(trial))  # the very file that is offered
+                    again(read_surface(trial), share)  # the very file that is offered
                 return Nearest(folder / SURFACE, _offer(found, wanted, folder, options()))
         except (InputError, NotConverged) as error:
             say(f"rounded to {wanted:.3g} m: {error}")

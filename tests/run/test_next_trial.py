@@ -133,10 +133,10 @@ def test_after_a_shell_that_lies_on_the_ground_come_stiffer_rods_whatever_it_is_
     monkeypatch.setattr(next_trial, "next_spare", lambda *how: asked.append(how) or spare)
     monkeypatch.setattr(next_trial, "next_section", lambda *_: 1)
     tried = {0: failed(Why.STABILITY, 0.3), 1: failed(why, 0.75, 3.6)}
-    assert next_trial.after("net", SOME, tried, last=last) == then
-    assert asked == ([("net", SOME, 1, pytest.approx(2.2**1.3))] if then != 1 else [])
+    assert next_trial.after("net", SOME, tried, bent=0.65 if last else 0.0) == then
+    assert asked == ([("net", SOME, 1, pytest.approx(2.2**1.3), 0.65)] if then != 1 else [])
     monkeypatch.setattr(next_trial, "next_section", lambda *_: 2)
-    assert next_trial.after("net", SOME, tried, last=last) == 2, "one is likely to bear it"
+    assert next_trial.after("net", SOME, tried, bent=0.65 if last else 0.0) == 2, "one is likely to bear it"
 
 
 @pytest.mark.parametrize(

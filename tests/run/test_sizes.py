@@ -210,9 +210,16 @@ def test_after_what_fell_come_the_least_stiff_rods_that_are_stiff_enough_and_hav
         section(0.01, 2.0, share=0.5), section(0.01, 4.0, share=0.66), section(0.01, 5.0, share=0.65),
         section(0.01, 8.0, share=0.6), section(0.01, 9.0, share=0.7),
     ]  # fmt: skip
-    assert [sizes.next_spare(None, some, 0, times) for times in (1.5, 2.5, 2.6, 4.0, 99.0)] == [2, 2, 3, 3, 3]
-    assert sizes.next_spare(None, some, 4, 1.3) == 4, "none is stiffer"
-    assert sizes.next_spare(None, [section(0.01, 2.0, share=0.7)], 0, 1.3) == 0
+    assert [sizes.next_spare(None, some, 0, times, 0.65) for times in (1.5, 2.5, 2.6, 4.0, 99.0)] == [
+        2,
+        2,
+        3,
+        3,
+        3,
+    ]
+    assert sizes.next_spare(None, some, 4, 1.3, 0.65) == 4, "none is stiffer"
+    assert sizes.next_spare(None, some, 0, 99.0, 0.7) == 4, "where bending may take more"
+    assert sizes.next_spare(None, [section(0.01, 2.0, share=0.7)], 0, 1.3, 0.65) == 0
 
 
 def test_the_stiffest_section_that_is_so_much_less_deep_comes_where_bending_breaks_rods():
