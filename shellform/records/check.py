@@ -19,7 +19,8 @@ _FINER = 4  # digits, that tell what is farther off than that from the limit
 class Cell:
     """One check of one design: what it `found`, in words, whether it `holds` (None: that isn't known),
     whether it was `asked` for at all, the `remedy` where it doesn't hold, of drawn structures the `share`
-    that stands, and what asks for care although it holds (`caution`)."""
+    that stands, what asks for care although it holds (`caution`), and how a structure as built has to be, or
+    is, where it doesn't bear it as it is set out (`provided`)."""
 
     found: str
     holds: bool | None
@@ -27,6 +28,7 @@ class Cell:
     remedy: str = ""
     share: float | None = None
     caution: str = ""
+    provided: str = ""
 
 
 class Subject(Enum):

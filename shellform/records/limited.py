@@ -16,6 +16,8 @@ from shellform.records.remedies import RodSizes, RodsOf, allow, allow_less, roun
 from shellform.records.summary import DesignRecord, LoadRecord
 from shellform.records.words import exceeds, load_title
 
+_ADJUSTED = "adjusted on site"  # as terminal, page and the how-to call it
+
 
 @dataclass(frozen=True)
 class Bounds:
@@ -199,12 +201,21 @@ def _stressed(
     cables = ", and tighten cables to their force before any load" if tight else ""
     last = "Fix supports last" if scaffold else "Raise it by a scaffold instead, fix supports last"
     care = f"{found}, which breaks rods. {last}, where rods' ends lie on a scaffold{cables}"
+    provided = "with rods beyond their strength as built"
     if then is not None:
         found += f"; adjusted on site {words(then)}"
         care += f": then {words(then)}"
+        if then[0] <= 1.0:
+            provided = _ADJUSTED
         if then[1] > 1.0:
             care += ". Where a rod bows out between two crossings, loosen it beside them and clamp it anew"
-    return Cell(found, None, False, caution=care if own[1] > 1.0 else "")
+    return Cell(
+        found,
+        None,
+        False,
+        caution=care if own[1] > 1.0 else "",
+        provided=provided if own[0] > 1.0 else "",
+    )
 
 
 def _pulled(own: tuple[float, float], then: tuple[float, float] | None, most: float) -> Cell:
@@ -220,12 +231,21 @@ def _pulled(own: tuple[float, float], then: tuple[float, float] | None, most: fl
         f"{found}, more than the {newtons(most)} of cable.force_max. Tighten cables to their force before any "
         "load, not to their length alone"
     )
+    provided = "with cables beyond cable.force_max as built"
     if then is not None:
         found += f"; adjusted on site {words(then)}"
         care += f": then {words(then)}"
+        if not exceeds(then[0], most):
+            provided = _ADJUSTED
         if exceeds(then[1], most):
             care += ". For more than that take stronger cables"
-    return Cell(found, None, False, caution=care if exceeds(own[1], most) else "")
+    return Cell(
+        found,
+        None,
+        False,
+        caution=care if exceeds(own[1], most) else "",
+        provided=provided if exceeds(own[0], most) else "",
+    )
 
 
 def _at_most(

@@ -232,13 +232,15 @@ class DocumentsRecord:
 class VerdictRecord:
     """Whether the `design` to build `holds`: what `failed`, a sentence with reason and remedy each, and the
     checks that were asked for and `not_examined`. It holds where neither is (verdict.py); `cautions`, a
-    sentence each, ask for care all the same."""
+    sentence each, ask for care all the same, and `provided` says in a few words how it is to be built, or
+    what it bears as built, where rods or cables don't bear it as it is set out."""
 
     design: str
     holds: bool
     failed: tuple[str, ...]
     not_examined: tuple[str, ...]
     cautions: tuple[str, ...] = ()
+    provided: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

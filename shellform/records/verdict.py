@@ -38,7 +38,11 @@ def verdict(found: Sequence[Check], design: str) -> VerdictRecord:
     """Whether the design holds, by its checks: the reason and then the remedy of each that fails."""
     broken = tuple(_sentence(check, check.cells[design]) for check in failed(found, design))
     unknown = tuple(check.name for check in open_checks(found, design))
-    return VerdictRecord(design, not broken and not unknown, broken, unknown, _cautions(found, design))
+    cells = [check.cells.get(design, UNASKED) for check in found]
+    provided = tuple(dict.fromkeys(cell.provided for cell in cells if cell.provided))
+    return VerdictRecord(
+        design, not broken and not unknown, broken, unknown, _cautions(found, design), provided
+    )
 
 
 def _cautions(found: Sequence[Check], design: str) -> tuple[str, ...]:
@@ -79,7 +83,8 @@ def headline(record: VerdictRecord) -> str:
     if record.not_examined:
         return f"{name} is not examined: {how_many(len(record.not_examined), 'check is', 'checks are')} still open."
     care = f", with {how_many(len(record.cautions), 'caution', 'cautions')}" if record.cautions else ""
-    return f"{name} holds: all checks do{care}."
+    how = f", {' and '.join(record.provided)}" if record.provided else ""
+    return f"{name} holds{how}: all checks do{care}."
 
 
 def _sentence(check: Check, cell: Cell) -> str:

@@ -453,6 +453,7 @@ def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_b
     assert (own[rods].found, own[rods].asked) == ("90 % of the strength, 99.9 % in the worst", False)
     assert own[cables].found == "18 N, 20 N in the worst"
     assert own[rods].caution == own[cables].caution == ""
+    assert own[rods].provided == own[cables].provided == ""
     own = made((1.06, 1.3), (18.0, 26.0))
     assert own[rods].caution.startswith("106 % of the strength, 130 % in the worst, which breaks rods")
     assert own[rods].caution.endswith("tighten cables to their force before any load"), (
@@ -469,6 +470,22 @@ def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_b
     assert then[cables].caution.endswith("not to their length alone: then 17 N, 20 N in the worst")
     then = made((1.06, 1.3), (18.0, 26.0), shape((0.61, 1.01), (17.0, 20.5)))
     assert "loosen it beside them" in then[rods].caution
+    over, pulled = "with rods beyond their strength as built", "with cables beyond cable.force_max as built"
+    for own, adjusted, said in (
+        ((1.06, 26.0), (1.0, 20.0), ("adjusted on site",)),
+        ((1.06, 18.0), (1.0, 17.0), ("adjusted on site",)),
+        ((0.9, 26.0), (0.8, 20.0), ("adjusted on site",)),
+        ((0.9, 18.0), (0.8, 17.0), ()),
+        ((1.06, 26.0), (1.01, 20.0), (over, "adjusted on site")),
+        ((1.06, 26.0), (1.0, 20.5), ("adjusted on site", pulled)),
+        ((1.06, 26.0), None, (over, pulled)),
+    ):
+        after = adjusted and shape(2 * adjusted[:1], 2 * adjusted[1:])
+        record = verdict_of(made((own[0], 1.3), (own[1], 30.0), after))
+        assert record.provided == said
+        assert headline(record).startswith(
+            f"The polished design holds{', ' if said else ''}{' and '.join(said)}: all"
+        )
     assert then[cables].caution.endswith("20.5 N in the worst. For more than that take stronger cables")
     slack = {"none": load("none", cable_force_max=0.0)}
     slack["design"] = load("design", built_shape=shape((1.06, 1.3), (18.0, 18.0)))
