@@ -4,8 +4,8 @@ Three are tried, each where the reason says that it may help, and offered only w
 walls all round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a
 rounded surface, where its rods are bent too much (way_out.py), on walls where it falls on edge beams; and as
 much concrete as these bear, where no rounded surface helps, or it falls of its load alone. None is begun once
-the work is done that a surface is worth. Each ends with the first design that stands; who goes that way has
-it finished.
+the work is done that a surface is worth, of which two fifths are left for rounded ones whatever came before.
+Each ends with the first design that stands; who goes that way has it finished.
 
 Of a shell that stands and strays too far as built walls are tried too, where edge beams carry its edge.
 """
@@ -35,6 +35,7 @@ _WELL_COVERED = 1.4 * COVERED  # spacings: of COVERED itself half the nets are b
 _APART = 1.3  # from one to the next, at the least
 _FURTHER = 1.7  # times the largest radius, where it helps nothing
 _TRIED = 0.8  # of the work that is left: on rounded surfaces, on these again on walls, and with less concrete
+_ROUNDED = 0.4  # of all the work, that is left for rounded surfaces, whatever came before
 _WALLED = 0.4  # on walls, with which large nets are tried once
 _NEARLY = 0.2  # of the load needed, that a shell has to bear which is tried thoroughly
 _WALLS = "--edges wall"
@@ -92,10 +93,11 @@ def with_ways_out(
     if _walls_may_help(refusal, surface, wish):
         way_out = _on_walls(surface, wish, say, whole.part(_WALLED))
     if way_out is None and isinstance(refusal, Unbuildable) and not wish.rod:
+        whole.leave(_ROUNDED)
         again = _Rounded(wish, whole, say)
         way_out = _to_nearest(refusal, surface, wish, output, again, say)
         if way_out is None:
-            refusal = refusal.untried() if again.too_late else refusal.in_vain()
+            refusal = refusal.in_vain()
             way_out = _poured_first(refusal, surface, wish, say, whole.rest(_TRIED))
     if way_out is None and isinstance(refusal, Falls) and _may_be_less(refusal, wish) and not whole.over:
         way_out = _poured_first(refusal, surface, wish, say, whole.rest(_TRIED))
@@ -177,7 +179,6 @@ class _Rounded:
         self.design: FirstDesign | None = None  # of the last surface, where one stands
         self.wish = wish  # of which it is
         self.options = ""  # of the command, that stand for it
-        self.too_late = False  # whether no work was left for even the first
         self.best = _Brief(0.0, wish, 0.0)
         self._thorough = False
         self._begun = self._covered = False
@@ -200,8 +201,7 @@ class _Rounded:
     def __call__(self, surface: Surface, share: float) -> None:
         """Raises InputError or NotConverged where no design stands on the surface, rounded to such a share of
         the radius."""
-        self.too_late = not self._begun and self._brief.over
-        self._begun = self._begun or not self.too_late
+        self._begun = True
         plinths = plinths_for(surface)  # which whoever follows gets too
         surface = surface if plinths is None else plinths.surface
         wish = self.best.wish if self._thorough else self.wish

@@ -66,21 +66,11 @@ class Unbuildable(InputError):
     def in_vain(self) -> Unbuildable:
         """The same, where none of the ways out that were tried led to a design."""
         found = f"no surface near it that is rounded there to {self.radius:.2g} m or more was found on which a design stands"
-        return self._saying(found, "It takes a rounder form there.")
-
-    def untried(self) -> Unbuildable:
-        """The same, where no work was left to try any way out."""
-        return self._saying(
-            "rounder surfaces were left untried, since the search had taken all the work that is allowed",
-            self.remedy,
-        )
-
-    def _saying(self, more: str, remedy: str) -> Unbuildable:
         return Unbuildable(
-            f"{self.what}; {more}",
+            f"{self.what}; {found}",
             why=self.why,
             where=self.where,
-            remedy=remedy,
+            remedy="It takes a rounder form there.",
             spacing=self.spacing,
             radius=self.radius,
             bears=self.bears,

@@ -559,7 +559,14 @@ def test_sections_are_narrowed_down_only_where_no_more_layers_come(monkeypatch, 
     monkeypatch.setattr(search, "_stands", lambda placed, choice, *_: tried.append(choice) or "falls")
     monkeypatch.setattr(first_design, "hopeless", lambda *_: False)
     monkeypatch.setattr(first_design, "first_choice", lambda *_: 0)
-    monkeypatch.setattr(first_design, "after", lambda net, possible, tried, last: len(tried))
+    shares = []
+    monkeypatch.setattr(
+        first_design, "after", lambda net, possible, tried, bent: shares.append(bent) or len(tried)
+    )
     monkeypatch.setattr(first_design, "narrowed", lambda *_: narrowed)
     assert search._first_that_stands(SimpleNamespace(net=None), row, 0.5, 0.05) is None
     assert tried == row[:trials]
+    assert set(shares) == {0.65 if layers == (1,) else 0.0}
+    search.allowance.thin_layers = True
+    assert search._first_that_stands(SimpleNamespace(net=None), row, 0.5, 0.05) is None
+    assert shares[-1] == (0.9 if layers == (1,) else 0.0), "thorough trials take what is bent harder, last"
