@@ -4,6 +4,8 @@ import re
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
 
 import shellform as sf
 from shellform.net.refusal import NoNet, Reason
@@ -72,6 +74,38 @@ def test_a_smoothed_edge_lies_on_the_surface_and_is_bent_as_that_is():
     surface = surface_of(Draft(*cut(14.0, 0.4, disc(6.0))), "disc")
     assert np.abs(surface.vertices - raised(surface.vertices[:, :2]))[:, 2].max() < 1e-3
     assert np.abs(curvature(surface)).max() == pytest.approx(BEND, rel=0.02)
+
+
+def bubble(radius, step, rise):
+    """A soap film under pressure, held on the ground along the whole cells in a disc: points and faces."""
+    plan, faces = sheet(2.0 * radius + 4.0 * step, step)
+    plan, faces = used(plan, faces[disc(radius)(plan[faces].mean(axis=1))])
+    sides = np.sort(np.vstack([faces[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1)
+    sides, times = np.unique(sides, axis=0, return_counts=True)
+    free = np.setdiff1d(np.arange(len(plan)), sides[times == 1])
+    ties = sp.coo_array((np.ones(len(sides)), sides.T), shape=2 * (len(plan),)).tocsr()
+    ties = ties + ties.T
+    pull = (sp.diags_array(ties.sum(axis=1)) - ties).tocsc()
+    height = np.zeros(len(plan))
+    height[free] = spsolve(pull[free][:, free], np.ones(len(free)))
+    return np.column_stack([plan, rise * height / height.max()]), split(faces)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 25.0])
+def test_an_edge_whose_teeth_lie_in_a_plane_stays_in_it(tilt):
+    """A bubble over whole cells, held on the ground, had an edge up to 0.1 m above it and below it, which
+    rounding then kept: a star in plan had no net."""
+    points, faces = bubble(6.0, 0.5, 2.5)
+    c, s = np.cos(np.deg2rad(tilt)), np.sin(np.deg2rad(tilt))
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
+    surface = surface_of(Draft(points @ turn, faces), "bubble")
+    rim = edge(surface) @ turn.T
+    assert np.abs(rim[:, 2]).max() < 1e-9
+    assert np.abs(np.hypot(*rim[:, :2].T) - np.hypot(*rim[:, :2].T).mean()).max() < 0.3 * 0.5
+    before = make_surface(points, faces)
+    assert np.abs(curvature(surface)).max() < 1.2 * np.abs(curvature(before)).max()
+    turned = np.abs(teeth._turn(rim, 1))
+    assert np.rad2deg(turned.max()) < 20.0, "no tooth is left"
 
 
 def test_vertices_off_the_edge_stay_where_they_are():

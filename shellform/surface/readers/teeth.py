@@ -10,20 +10,28 @@ large where there are no teeth, so that corners that are meant stay. Moved verti
 or where it goes on past its edge, by a quadratic fitted to those around. Triangles that become slivers or
 turn over are dropped, and the vertices that then lie on the edge are moved to the curve too.
 
+An edge whose teeth lie in one plane, as that of a form found over a plan of whole cells, held on the ground
+all along it, stays in that plane: its vertices slide along the surface to where it meets the plane, n the
+surface's normal, m the plane's and h the height above it, by
+
+    h (n m) t / t²,   t = n - (n m) m,
+
+and the curve through where they came to, smoothed as before, is the edge.
+
 An edge whose sides are longer than an eighth of the surface's extent, or that has few teeth, is meant so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu, spsolve
 from scipy.spatial import cKDTree
 
-from shellform.arrays import Flags, Indices, Reals
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import how_many
 from shellform.quantities import number
 from shellform.surface.readers.draft import Draft, noted
@@ -41,7 +49,11 @@ _MEANT = 0.125  # of the narrower extent: longer sides aren't a tooth's
 _WAVES = 2.0  # square roots of the number of vertices: the length of waves that are halved
 _FIXED = 1e8  # the weight of vertices that stay
 _TIGHTENINGS = 40  # of the weights, at the most
+_LEVEL = 0.02  # of its median side: an edge that keeps to a plane so closely lies in it
+_SLIDES = 4  # along the surface, to its plane
+_STEEP = 0.05  # t², at the least: a surface that lies nearly in the plane meets it anywhere
 _AROUND = 24  # vertices to which the surface is fitted
+_NEAR = 8  # vertices whose normals tell how a place slides
 _THIN = 0.1  # of the edge's median side: the least height of a triangle
 _ROUNDS = 12  # of dropping triangles
 # Of the triangles: a larger piece that would hang together with the others no more is meant.
@@ -79,10 +91,10 @@ def _smoothed(
     dropped, or a piece would break off."""
     placed, on_edge = points.copy(), np.zeros(len(points), dtype=bool)
     on_edge[_rim(faces, len(points))] = True
+    normals = rough_normals(points, faces)
     for loop, side in curves:
-        placed[loop] = _curve(points[loop], side)
+        placed[loop] = _edge(points, normals, points[loop], side)
     moved = (placed != points).any(axis=1)
-    placed[moved] = _onto(points, rough_normals(points, faces), placed[moved])
     after = [np.roll(loop, -1) for loop, _ in curves]
     pieces = [placed[np.stack([loop, to, to], axis=1)] for (loop, _), to in zip(curves, after, strict=True)]
     track = Tree(np.vstack(pieces))
@@ -106,6 +118,20 @@ def _smoothed(
     if turned.any() or len(np.unique(starts)) < len(starts):
         return None
     return placed, faces, track
+
+
+def _edge(points: Reals, normals: Reals, corners: Reals, side: float) -> Reals:
+    """The places (n, 3) of the `corners` (n, 3) of a toothed edge once it is smooth, on the surface of these
+    points with their normals (v, 3)."""
+    bending = _bending(corners)
+    placed = _curve(corners, side, bending)
+    moved = (placed != corners).any(axis=1)
+    placed[moved] = _onto(points, normals, placed[moved])
+    plane = _plane(corners, _LEVEL * side)
+    if plane is None:
+        return placed
+    placed[moved] = _slid(points, normals, placed[moved], plane, side)
+    return np.where(moved[:, None], _projected(bending.through(placed), plane), corners)
 
 
 def _told(draft: Draft, placed: Reals, faces: Indices, track: Tree, edges: int) -> Draft:
@@ -170,25 +196,76 @@ def _teeth(corners: Reals) -> Indices:
     return np.column_stack([sharp, np.roll(sharp, -1)])[is_tooth]
 
 
-def _curve(corners: Reals, side: float) -> Reals:
-    """The places (n, 3) on the smooth curve for the corners of a toothed edge with this median `side`, m."""
-    count, middle = len(corners), corners.mean(axis=0)
-    corners = corners - middle  # far from the origin rounding would bend it
+@dataclass(frozen=True, eq=False)
+class _Bending(Record):
+    """How the smooth curve of an edge bends: by its `stiffness`, but at the corners that are `kept` (c,),
+    with the corners between which it is `free` (n,)."""
+
+    stiffness: float
+    kept: Indices
+    free: Flags
+
+    def through(self, corners: Reals, weight: Reals | None = None) -> Reals:
+        """The places (n, 3) on the curve that lies near the `corners` (n, 3), by their `weight` (n,) (None:
+        all alike)."""
+        middle = corners.mean(axis=0)  # far from the origin rounding would bend it
+        weight = np.where(self.free, 1.0, _FIXED) if weight is None else weight
+        return np.asarray(middle + _bent(corners - middle, weight, self.stiffness, self.kept))
+
+
+def _bending(corners: Reals) -> _Bending:
+    """How the curve of a toothed edge with these corners (n, 3) bends."""
+    count, corners = len(corners), corners - corners.mean(axis=0)
     reach = _WAVES * np.sqrt(count)  # the curve's waves, in corners
     at = np.zeros(count, dtype=bool)
     at[_teeth(corners)] = True
     away = cKDTree(np.flatnonzero(at)[:, None], boxsize=[count]).query(np.arange(count)[:, None])[0]
     free = away <= 0.5 * reach
-    weight = np.where(free, 1.0, _FIXED)
     stiffness = (reach / (2.0 * np.pi)) ** 4
-    kept = _meant(corners, weight, stiffness, round(0.25 * reach))
+    kept = _meant(corners, np.where(free, 1.0, _FIXED), stiffness, round(0.25 * reach))
+    return _Bending(stiffness, kept, free)
+
+
+def _curve(corners: Reals, side: float, bending: _Bending) -> Reals:
+    """The places (n, 3) on the smooth curve for the corners of a toothed edge with this median `side`, m."""
+    weight = np.where(bending.free, 1.0, _FIXED)
     for _ in range(_TIGHTENINGS):
-        placed = _bent(corners, weight, stiffness, kept)
+        placed = bending.through(corners, weight)
         off = np.linalg.norm(placed - corners, axis=1) / side
         if off.max() <= 1.0:
             break
         weight *= np.maximum(off, 1.0)
-    return middle + np.where(free[:, None], placed, corners)
+    return np.where(bending.free[:, None], placed, corners)
+
+
+def _plane(corners: Reals, most: float) -> tuple[Reals, Reals] | None:
+    """A point (3,) of the plane in which a curve with these corners (n, 3) lies to within `most`, m, and the
+    plane's normal (3,); None where it lies in none."""
+    middle = corners.mean(axis=0)
+    normal = np.linalg.svd(corners - middle, full_matrices=False)[2][2]
+    return (middle, normal) if np.ptp(corners @ normal) <= most else None
+
+
+def _slid(points: Reals, normals: Reals, places: Reals, plane: tuple[Reals, Reals], most: float) -> Reals:
+    """The `places` (k, 3) on or beside a surface, slid along it by `most`, m, at the most, to where it meets
+    the plane."""
+    (middle, upright), tree, start = plane, cKDTree(points), places
+    for _ in range(_SLIDES):
+        normal = normals[tree.query(places, k=_NEAR)[1]].sum(axis=1)
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        steep = normal @ upright
+        level = normal - steep[:, None] * upright
+        by = (places - middle) @ upright * steep / np.maximum(np.sum(level * level, axis=1), _STEEP)
+        off = places + by[:, None] * level - start
+        far = np.linalg.norm(off, axis=1)[:, None]
+        places = _onto(points, normals, start + off * np.minimum(1.0, most / np.maximum(far, 1e-300)))
+    return places
+
+
+def _projected(places: Reals, plane: tuple[Reals, Reals]) -> Reals:
+    """The `places` (n, 3) upright above or below them in the plane."""
+    middle, upright = plane
+    return np.asarray(places - ((places - middle) @ upright)[:, None] * upright)
 
 
 def _bent(corners: Reals, weight: Reals, stiffness: float, kept: Indices) -> Reals:
