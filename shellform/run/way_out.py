@@ -28,6 +28,7 @@ BUILDABLE = "buildable"  # folder in a run's
 COVERED = 3.0  # spacings: a radius of curvature that nets cover
 MORE = (1.0, 1.5, 2.2)  # times the radius asked for
 _CLOSE = 1.1  # from one radius to the next, at the least
+_NEARER = 1.25  # the same, for a nearer surface than one that was taken
 _SLENDER = 1e-9  # m: less is no change
 _FAR_OFF = 0.2  # of a surface's height, in the mean
 
@@ -68,36 +69,40 @@ def nearest_buildable(
     change.png; None where none is found.
 
     `radius`, m, to which the surface must be rounded at least; `shares` of it are tried, one after the other,
-    and where the surface can't be rounded to one, those between it and the one before; `again` does with a
-    surface rounded to a share what was refused and raises InputError or NotConverged where it is refused
-    again; `say` hears what is tried; `options` are those of the command with which `again` went on.
+    where the surface can't be rounded to one those between it and the one before, and after the first that is
+    taken the one between that and the one that was refused before; `again` does with a surface rounded to a
+    share what was refused and raises InputError or NotConverged where it is refused again; `say` hears what
+    is tried; `options` are those of the command with which `again` went on.
     """
     from shellform.surface.readers.meshes import write_mesh
 
-    left, rounded = list(shares), 0.0
+    left, before = list(shares), 0.0
+    nearest: tuple[Faired, float] | None = None
     while left:
         share, *left = left
-        wanted = share * radius
+        wanted, between = share * radius, math.sqrt(before * share)
         try:
             found = faired(surface, wanted)
         except (InputError, NotConverged) as error:
             say(f"rounded to {wanted:.3g} m: {error.what}")  # nobody asked for this radius: no remedy
-            between = math.sqrt(rounded * share)
-            left = [between] if between > _CLOSE * rounded > 0.0 else []  # still rounder is still harder
+            # still rounder is still harder
+            left = [between] if nearest is None and between > _CLOSE * before > 0.0 else []
             continue
-        rounded = share
         try:
             if float(found.change.max()) > _SLENDER:
                 with TemporaryDirectory() as place:
                     trial = Path(place) / SURFACE
                     write_mesh(trial, found.surface)
                     again(read_surface(trial), share)  # the very file that is offered
-                return Nearest(folder / SURFACE, _offer(found, wanted, folder, options()))
+                left = [between] if nearest is None and between > _NEARER * before > 0.0 else []
+                nearest = found, wanted
+                continue
         except (InputError, NotConverged) as error:
             say(f"rounded to {wanted:.3g} m: {error}")
         else:
             say(f"it is rounded to {wanted:.3g} m already")
-    return None
+        before = share
+    return None if nearest is None else Nearest(folder / SURFACE, _offer(*nearest, folder, options()))
 
 
 def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:

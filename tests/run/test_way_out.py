@@ -130,6 +130,43 @@ def test_between_a_radius_to_which_a_surface_is_rounded_and_one_to_which_it_is_n
     assert tried == pytest.approx([each / 1.5 for each in radii if each <= most]), "each with its own share"
 
 
+@pytest.mark.parametrize(
+    ("shares", "stands", "tried", "offered"),
+    [
+        ((1.0, 1.7, 2.9), 1.2, (1.0, 1.7, 1.7**0.5), 1.7**0.5),
+        ((1.0, 1.7, 2.9), 1.5, (1.0, 1.7, 1.7**0.5), 1.7),
+        ((1.0, 1.7, 2.9), 0.5, (1.0,), 1.0),  # the first that is tried
+        ((1.0, 1.5), 1.2, (1.0, 1.5), 1.5),  # too near for one between
+    ],
+)
+def test_a_nearer_surface_than_the_first_that_is_taken_is_tried_where_one_was_refused_before(
+    tmp_path, monkeypatch, shares, stands, tried, offered
+):
+    """A groined vault had no net at 4.28 m, for a hundredth of a percent, and lay 3.2 m off at 7.28 m."""
+    surface, asked = sheet(gable), []
+
+    def rounded(surface, radius):
+        return Faired(surface, surface, np.full(len(surface.vertices), 0.01 * radius))
+
+    def again(rounded, share):
+        asked.append(share)
+        if share < stands:
+            raise InputError("no", where="net")
+
+    monkeypatch.setattr(way_out, "faired", rounded)
+    found = way_out.nearest_buildable(surface, 2.0, tmp_path / "out", again, unheard, shares)
+    assert asked == pytest.approx(tried)
+    assert f"creases rounded to {2.0 * offered:.3g} m, {0.02 * offered:.3g} m off at most" in found.told
+
+
+def test_with_most_of_the_work_done_no_nearer_surface_is_tried():
+    again = first_refusal._Rounded(DesignWish(), Allowance(1000), lambda text: None)
+    again.design = STANDS
+    again._brief.left = round(0.5 * again._brief.work) - 1
+    with pytest.raises(InputError, match="since a rounder one stands"):
+        again(sheet(gable), 1.3)
+
+
 def test_surfaces_are_rounded_to_what_nets_cover_before_what_is_sure_to_bear_the_load():
     def refusal(spacing, radius):
         return Unbuildable("no", why=Why.NET, where="rod", remedy="Round it.", spacing=spacing, radius=radius)
