@@ -4,8 +4,8 @@ Three are tried, each where the reason says that it may help, and offered only w
 walls all round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a
 rounded surface, where its rods are bent too much (way_out.py), on walls where it falls on edge beams; and as
 much concrete as these bear, where no rounded surface helps, or it falls of its load alone. None is begun once
-the work is done that a surface is worth, of which two fifths are left for each of the first two, whatever
-came before. Each ends with the first design that stands; who goes that way has it finished.
+the work is done that a surface is worth, of which a fifth is left for walls and two for rounded surfaces,
+whatever came before. Each ends with the first design that stands; who goes that way has it finished.
 
 Of a shell that stands and strays too far as built walls are tried too, where edge beams carry its edge.
 """
@@ -36,7 +36,8 @@ _APART = 1.3  # from one to the next, at the least
 _FURTHER = 1.7  # times the largest radius, where it helps nothing
 _TRIED = 0.8  # of the work that is left: on rounded surfaces, on these again on walls, and with less concrete
 _ROUNDED = 0.4  # of all the work, that is left for rounded surfaces, whatever came before
-_WALLED = 0.4  # and for walls, with which large nets are tried once
+_FOR_WALLS = 0.2  # the same for walls
+_WALLED = 0.4  # on walls at the most, with which large nets are tried once
 _SPARE = 0.5  # of the work on rounded surfaces, that has to be left where a nearer one is tried than one that stands
 _NEARLY = 0.2  # of the load needed, that a shell has to bear which is tried thoroughly
 _WALLS = "--edges wall"
@@ -92,7 +93,7 @@ def with_ways_out(
     whole = allowance or Allowance()
     way_out: WayOut | None = None
     if _walls_may_help(refusal, surface, wish):
-        whole.leave(_WALLED)
+        whole.leave(_FOR_WALLS)
         way_out = _on_walls(surface, wish, say, whole.part(_WALLED))
     if way_out is None and isinstance(refusal, Unbuildable) and not wish.rod:
         whole.leave(_ROUNDED)
