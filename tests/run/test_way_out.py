@@ -339,6 +339,21 @@ def test_two_fifths_of_the_work_are_left_for_rounded_surfaces_whatever_came_befo
     assert any("left untried" in each for each in heard), "rounder ones, once that is spent"
 
 
+def test_a_fifth_of_the_work_is_left_for_walls_whatever_came_before(tmp_path, monkeypatch):
+    """A translational shell of 30 m, which stands on walls, was told to take a rounder form instead."""
+    left, worth = [], Allowance()
+    worth.part(1.0).spend(worth.work)
+    monkeypatch.setattr(first_refusal, "_walls_may_help", lambda *_: True)
+    monkeypatch.setattr(first_refusal, "_on_walls", lambda *given: left.append(given[-1]) or "walls")
+    refusal = Unbuildable("no", why=Why.STRENGTH, where="rod", remedy="Round it.", spacing=0.4, radius=1.7)
+    found = first_refusal.with_ways_out(
+        refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", lambda text: None, worth
+    )
+    assert found.way_out == "walls"
+    assert worth.left == round(0.2 * worth.work)
+    assert not left[0].over
+
+
 def test_what_a_part_of_the_work_spends_the_whole_has_spent_and_neither_goes_on_without_the_other():
     whole = Allowance(1000)
     search, walls = whole.part(0.5), whole.part(0.6)
