@@ -204,8 +204,8 @@ class _Rounded:
     def __call__(self, surface: Surface, share: float) -> None:
         """Raises InputError or NotConverged where no design stands on the surface, rounded to such a share of
         the radius."""
-        self._begun = True
-        if self.design is not None and self._brief.left < _SPARE * self._brief.work:
+        self._begun, stands = True, self.design is not None
+        if stands and self._brief.left < _SPARE * self._brief.work:
             raise InputError("left untried, since a rounder one stands and most of the work is done")
         plinths = plinths_for(surface)  # which whoever follows gets too
         surface = surface if plinths is None else plinths.surface
@@ -216,8 +216,8 @@ class _Rounded:
         except (InputError, NotConverged) as error:
             covered = not (isinstance(error, Unbuildable) and error.why is Why.NET)
             self._covered = self._covered or covered
-            if not (covered and _on_edge_beams(surface, wish)):
-                raise
+            if stands or not (covered and _on_edge_beams(surface, wish)):
+                raise  # a rounder one that stands on its own edges is worth more than one on walls
             self._say(f"rounded: {error}")
             walls = replace(wish, edges="wall", angle=self._brief.angle)
             self.design = self._tried(f"{how}, on walls", surface, share, walls, self._walled)

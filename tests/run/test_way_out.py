@@ -159,6 +159,28 @@ def test_a_nearer_surface_than_the_first_that_is_taken_is_tried_where_one_was_re
     assert f"creases rounded to {2.0 * offered:.3g} m, {0.02 * offered:.3g} m off at most" in found.told
 
 
+def test_a_nearer_surface_than_one_that_stands_on_its_own_edges_is_not_tried_on_walls(monkeypatch):
+    tried = []
+
+    def search(surface, wish, say, allowance, *, finer):
+        tried.append(wish.edges)
+        if len(tried) != 3:
+            raise NotConverged("falls", residual=0.0, iterations=0)
+        return STANDS
+
+    monkeypatch.setattr(first_refusal, "standing_design", search)
+    again = first_refusal._Rounded(DesignWish(), Allowance(), lambda text: None)
+    for share, edges in ((1.0, ["auto", "wall"]), (1.7, ["auto"]), (1.3, ["auto"])):
+        before = len(tried)
+        if share == 1.7:
+            again(sheet(gable), share)
+        else:
+            with pytest.raises(NotConverged):
+                again(sheet(gable), share)
+        assert tried[before:] == edges
+    assert (again.design, again.wish, again.options) == (STANDS, DesignWish(), "")
+
+
 def test_with_most_of_the_work_done_no_nearer_surface_is_tried():
     again = first_refusal._Rounded(DesignWish(), Allowance(1000), lambda text: None)
     again.design = STANDS
