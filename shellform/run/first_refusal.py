@@ -86,10 +86,13 @@ def with_ways_out(
     output: Path,
     say: Say,
     allowance: Allowance | None = None,
+    *,
+    uncut: Surface | None = None,
 ) -> Refused:
-    """The refusal with the first way out that leads to a design; without one, saying that none was found or
-    tried. What is offered as a surface is written into a folder beside `output`. `say` hears what is tried;
-    each kind of way out has its share of the `allowance`, of which the search has taken its own."""
+    """The refusal with the first way out that leads to a design; without one, saying that none was found.
+    What is offered as a surface is written into a folder beside `output`. `say` hears what is tried; each
+    kind of way out has its share of the `allowance`, of which the search has taken its own. `uncut`: the
+    surface that reaches down into plinths, which is rounded where the one above them can't be."""
     whole = allowance or Allowance()
     way_out: WayOut | None = None
     if _walls_may_help(refusal, surface, wish):
@@ -98,7 +101,7 @@ def with_ways_out(
     if way_out is None and isinstance(refusal, Unbuildable) and not wish.rod:
         whole.leave(_ROUNDED)
         again = _Rounded(wish, whole, say)
-        way_out = _to_nearest(refusal, surface, wish, output, again, say)
+        way_out = _to_nearest(refusal, surface, uncut or surface, wish, output, again, say)
         if way_out is None:
             refusal = refusal.in_vain()
             way_out = _poured_first(refusal, surface, wish, say, whole.rest(_TRIED))
@@ -121,19 +124,28 @@ def steadier_on_walls(surface: Surface, wish: DesignWish, say: Say, allowance: A
 
 
 def _to_nearest(
-    refusal: Unbuildable, surface: Surface, wish: DesignWish, output: Path, again: _Rounded, say: Say
+    refusal: Unbuildable,
+    surface: Surface,
+    uncut: Surface,
+    wish: DesignWish,
+    output: Path,
+    again: _Rounded,
+    say: Say,
 ) -> WayOut | None:
     """The nearest surface that can be built, on walls where it falls otherwise; None where none was found."""
     folder = _unused(output.with_name(f"{output.stem}-{BUILDABLE}"))
     tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
 
-    def nearest_of(shares: Sequence[float]) -> Nearest | None:
+    def nearest_of(surface: Surface, shares: Sequence[float]) -> Nearest | None:
         return nearest_buildable(surface, refusal.radius, folder, again, say, shares, lambda: again.options)
 
-    nearest = nearest_of(tried)
+    nearest = nearest_of(surface, tried)
+    if nearest is None and uncut is not surface and not again.begun:
+        surface = uncut  # cut off, feet end in what may not be rounded
+        nearest = nearest_of(surface, tried)
     if nearest is None and again.may_stand:
         again.go_on()
-        nearest = nearest_of([again.best.share])
+        nearest = nearest_of(surface, [again.best.share])
     if nearest is None:
         return None
     assert again.design is not None
@@ -184,7 +196,8 @@ class _Rounded:
         self.options = ""  # of the command, that stand for it
         self.best = _Brief(0.0, wish, 0.0)
         self._thorough = False
-        self._begun = self._covered = False
+        self.begun = False  # whether any surface was tried
+        self._covered = False
         self._say = say
         self._whole = whole
         self._brief = whole.rest(_TRIED, thorough=False, thins=False)
@@ -193,7 +206,7 @@ class _Rounded:
     @property
     def may_stand(self) -> bool:
         """Whether finer spacings are worth trying: something bore nearly enough, or nothing was covered."""
-        worth = self.best.bore >= _NEARLY or (self._begun and not self._covered)
+        worth = self.best.bore >= _NEARLY or (self.begun and not self._covered)
         return worth and self.wish.spacing is None and not self._whole.over
 
     def go_on(self) -> None:
@@ -204,7 +217,7 @@ class _Rounded:
     def __call__(self, surface: Surface, share: float) -> None:
         """Raises InputError or NotConverged where no design stands on the surface, rounded to such a share of
         the radius."""
-        self._begun, stands = True, self.design is not None
+        self.begun, stands = True, self.design is not None
         if stands and self._brief.left < _SPARE * self._brief.work:
             raise InputError("left untried, since a rounder one stands and most of the work is done")
         plinths = plinths_for(surface)  # which whoever follows gets too

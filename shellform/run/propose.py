@@ -93,7 +93,7 @@ def propose_case(
     try:
         design = first_design(ready.surface, wish, asked.say, worth.part(_SEARCH))
     except (InputError, NotConverged) as error:
-        refused = with_ways_out(error, ready.surface, wish, output, asked.say, worth)
+        refused = with_ways_out(error, ready.surface, wish, output, asked.say, worth, uncut=ready.uncut)
         taken = refused.way_out
         if taken is None or not way_out:
             raise refused.offered from error
@@ -110,9 +110,10 @@ def propose_case(
 @dataclass(frozen=True, eq=False)
 class _Ready:
     """A `surface` to design for, the `options` of [surface] that lead to it, and what was `told` of it, with
-    what was of its `plinths`, if it has any."""
+    what was of its `plinths`, if it has any; and the surface that reaches down into these, `uncut`."""
 
     surface: Surface
+    uncut: Surface
     options: Mapping[str, Any]
     told: tuple[str, ...]
     plinths: str
@@ -148,12 +149,13 @@ def _read(asked: _Asked, file: Path, options: Mapping[str, Any], spacing: float 
         asked.report(Event("surface", told[-1], Kind.NOTE))
     asked.report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
 
+    uncut = surface
     plinths = plinths_for(surface) if "above" not in options else None
     if plinths is not None:
         surface, options = plinths.surface, {**options, "above": plinths.above}
         asked.say(plinths.told)
         told = (*told, plinths.told)
-    return _Ready(surface, options, told, "" if plinths is None else plinths.told)
+    return _Ready(surface, uncut, options, told, "" if plinths is None else plinths.told)
 
 
 def _gone_on(asked: _Asked, ready: _Ready, why: str, taken: WayOut) -> dict[str, str]:

@@ -330,6 +330,30 @@ def test_a_rounded_surface_is_tried_on_the_plinths_that_whoever_follows_gets(tmp
     assert read_surface(named(told)).size[2] > cut.size[2], "it is offered whole"
 
 
+def test_where_what_is_above_plinths_is_not_rounded_the_surface_that_reaches_down_into_them_is(
+    tmp_path, monkeypatch
+):
+    """A roof of 45 m on feet wasn't rounded to 4.2 m above its plinths, and is with its feet, 3 cm off in the
+    mean."""
+    uncut, cut = sheet(gable), sheet(lambda x, y: 2.0 - 0.02 * y * y)
+    asked = []
+
+    def rounded(surface, radius):
+        asked.append(surface)
+        if surface is cut:
+            raise NotConverged("No surface near this one", residual=1.0, iterations=1)
+        return Faired(surface, surface, np.full(len(surface.vertices), 0.1))
+
+    monkeypatch.setattr(way_out, "faired", rounded)
+    monkeypatch.setattr(first_refusal, "standing_design", lambda *_, **__: STANDS)
+    refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
+    place = tmp_path / "case.toml"
+    found = first_refusal.with_ways_out(refusal, cut, DesignWish(), place, print, uncut=uncut)
+    assert asked == [cut, uncut]
+    assert found.way_out.design is STANDS
+    assert first_refusal.with_ways_out(refusal, cut, DesignWish(), place, print).way_out is None
+
+
 def test_of_a_radius_that_nobody_asked_for_no_remedy_is_told(tmp_path):
     refusal = InputError("is no shell", where="surface", remedy="Draw another.")
     surface, heard = sheet(gable), []
