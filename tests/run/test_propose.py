@@ -569,7 +569,7 @@ def test_the_way_out_taken_may_be_another_surface_which_the_case_then_names(tmp_
     offer = WayOut(design, wish, f"The nearest is {nearest}", nearest)
     monkeypatch.setattr(propose, "first_design", refused)
     monkeypatch.setattr(propose, "finished_design", finished)
-    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_: Refused(error, offer))
+    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_, **__: Refused(error, offer))
     case = tmp_path / "case.toml"
     propose_case(given, case, {"unit": "cm"}, allow_scripts=False, wish=wish, way_out=True)
     assert seen == pytest.approx([0.016, 1.2]), "the unit is the given file's"
@@ -586,7 +586,7 @@ def test_without_a_way_out_the_shell_stays_refused_for_its_own_reason(tmp_path, 
         raise InputError("is creased", where="rod", remedy="Round it.")
 
     monkeypatch.setattr(propose, "first_design", refused)
-    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_: Refused(error))
+    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_, **__: Refused(error))
     given, case = as_obj(tmp_path / "given.obj", dish(size=6.0, count=13)), tmp_path / "case.toml"
     with pytest.raises(InputError, match="is creased") as refusal:
         propose_case(given, case, {}, allow_scripts=False, way_out=True)
@@ -608,7 +608,7 @@ def test_what_was_done_to_a_surface_before_it_was_rounded_stays_in_the_case_s_he
     design = standing_design(read_surface(nearest), wish, print, Allowance())
     monkeypatch.setattr(propose, "first_design", refused)
     offer = WayOut(design, wish, f"The nearest is {nearest}", nearest)
-    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_: Refused(error, offer))
+    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_, **__: Refused(error, offer))
     case = folder / "case.toml"
     propose_case(given, case, {}, allow_scripts=False, wish=wish, way_out=True)
     assert load_case(case).title.startswith("given"), "what can't be printed in a path is written out"
