@@ -219,7 +219,7 @@ class _Rounded:
         the radius."""
         self.begun, stands = True, self.design is not None
         if stands and self._brief.left < _SPARE * self._brief.work:
-            raise InputError("left untried, since a rounder one stands and most of the work is done")
+            raise _untried("a rounder one stands and most of the work is done")
         plinths = plinths_for(surface)  # which whoever follows gets too
         surface = surface if plinths is None else plinths.surface
         wish = self.best.wish if self._thorough else self.wish
@@ -258,8 +258,13 @@ def _trial(
 ) -> FirstDesign:
     """What stands on another surface or with another wish, within the allowance of all such trials."""
     if allowance.over:
-        raise InputError("left untried, since what was tried before took all the work that is allowed")
+        raise _untried("what was tried before took all the work that is allowed")
     return standing_design(surface, wish, lambda text: say(f"{how}, {text}"), allowance, finer=finer)
+
+
+def _untried(why: str) -> InputError:
+    """Of a trial that isn't made, which no user asked for."""
+    return InputError(f"left untried, since {why}")
 
 
 def _walls_may_help(refusal: Refusal, surface: Surface, wish: DesignWish) -> bool:

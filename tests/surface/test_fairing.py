@@ -7,6 +7,7 @@ from scipy.spatial import Delaunay
 from shellform.errors import InputError, NotConverged
 from shellform.surface.shape import fairing
 from shellform.surface.shape.fairing import faired
+from shellform.surface.shape.quadratics import Quadratics, waves
 from shellform.surface.shape.target import curvature, make_surface
 from tests.net.edge_shells import oculus, sail
 
@@ -148,7 +149,7 @@ def peaks(x, y):
 
 
 def everywhere(surface):
-    return fairing._Fit(surface, np.ones(len(surface.vertices), dtype=bool))
+    return Quadratics(surface, np.ones(len(surface.vertices), dtype=bool))
 
 
 def test_what_is_not_rounded_at_once_is_rounded_in_stages():
@@ -239,10 +240,10 @@ def test_waves_are_none_on_a_quadratic_and_follow_from_places_as_they_are_told_t
     fit, points = everywhere(surface), surface.vertices
     upright = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     frames = fit.frames(upright)
-    assert np.abs(fit.found(fairing._waves, points, frames)).max() < 1e-9
-    rate = fit.by_distance(fairing._waves, points, frames, upright)
+    assert np.abs(fit.found(waves, points, frames)).max() < 1e-9
+    rate = fit.by_distance(waves, points, frames, upright)
     off = np.random.default_rng(0).normal(size=len(points))
-    there = fit.found(fairing._waves, points + off[:, None] * upright, frames)
+    there = fit.found(waves, points + off[:, None] * upright, frames)
     np.testing.assert_allclose(there[:, 0], rate @ off, rtol=1e-7, atol=1e-9)
     spike = (np.arange(len(points)) == fit.fitted[0]).astype(float)
     assert (rate @ spike)[0] < 0.0, "what stands out lies above its neighbours"

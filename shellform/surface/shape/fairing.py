@@ -41,7 +41,7 @@ the change from the surface as given.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +50,7 @@ import scipy.sparse as sp
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, NotConverged, require_number
 from shellform.structure.solve.factorisation import Factor, Symmetric
+from shellform.surface.shape.quadratics import Quadratics, principal, second, waves
 from shellform.surface.shape.target import ON_GROUND, Surface, make_surface, rough_normals
 from shellform.surface.shape.triangles import area_vectors, directed_edges, vertex_areas
 
@@ -67,9 +68,6 @@ _EVEN = 0.3
 _MARGIN = 0.96  # of the cap, at which forms are capped
 _HEAVY = 10.0  # times their area: vertices on the ground
 _RELAXED = 1.6  # over-relaxation
-
-
-_Measure = Callable[[Reals], Reals]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +99,9 @@ def faired(surface: Surface, radius: float) -> Faired:
             remedy="Give a smaller radius, or draw the surface anew.",
         )
     start = _refined(surface, _MESH * radius)
-    fits: list[_Fit] = []
+    fits: list[Quadratics] = []
     for chosen in (np.ones(len(start.vertices), dtype=bool), ~_on_ground(start)):
-        fits.append(_Fit(start, chosen))
+        fits.append(Quadratics(start, chosen))
         try:
             return _rounded(start, fits[-1], [radius])
         except NotConverged as error:
@@ -116,7 +114,7 @@ def faired(surface: Surface, radius: float) -> Faired:
     raise refusal
 
 
-def _stages(start: Surface, fit: _Fit, radius: float) -> list[float]:
+def _stages(start: Surface, fit: Quadratics, radius: float) -> list[float]:
     """The radii, m, to which the surface is rounded one after the other."""
     kept = 1.0 / max(fit.most(start.vertices, rough_normals(start.vertices, start.triangles)), 1e-300)
     first = max(_FIRST * radius, kept)
@@ -124,7 +122,7 @@ def _stages(start: Surface, fit: _Fit, radius: float) -> list[float]:
     return [*(first * _GROWTH**k for k in range(count)), radius]
 
 
-def _rounded(start: Surface, fit: _Fit, radii: Sequence[float]) -> Faired:
+def _rounded(start: Surface, fit: Quadratics, radii: Sequence[float]) -> Faired:
     """The nearest surface that keeps the cap of the last of the `radii`, m, where it is fitted, rounded to
     each of them in turn. Raises NotConverged."""
     at, weight, faces = start.vertices, _weights(start), start.triangles
@@ -150,7 +148,7 @@ def _rounded(start: Surface, fit: _Fit, radii: Sequence[float]) -> Faired:
 
 
 def _at_stage(
-    fit: _Fit, start: Surface, here: Surface, weight: Reals, radius: float, rounds: int
+    fit: Quadratics, start: Surface, here: Surface, weight: Reals, radius: float, rounds: int
 ) -> tuple[Reals, float]:
     """Places (v, 3) on the way from `here` to those nearest to the `start` that keep the radius, m, after as
     many rounds as help; and the largest curvature, 1/m, there, or the least that was met, where they
@@ -171,7 +169,7 @@ def _at_stage(
 
 
 def _round(
-    fit: _Fit,
+    fit: Quadratics,
     here: Surface,
     toward: Reals,
     weight: Reals,
@@ -184,14 +182,14 @@ def _round(
     `before` (v,), m: how far the vertices had moved along the directions before."""
     at = here.vertices + place[:, None] * toward
     frames = fit.frames(rough_normals(at, here.triangles))
-    own, rate = fit.found(_second, at, frames), fit.by_distance(_second, at, frames, toward)
+    own, rate = fit.found(second, at, frames), fit.by_distance(second, at, frames, toward)
     given = own - (rate @ place).reshape(-1, 3)
     area = radius**4 * weight[fit.fitted]
     weighted = sp.diags_array(np.repeat(area, 3) * np.tile([1.0, 2.0, 1.0], len(area))) @ rate
-    waves, wavier = fit.found(_waves, at, frames)[:, 0], fit.by_distance(_waves, at, frames, toward)
+    off, wavier = fit.found(waves, at, frames)[:, 0], fit.by_distance(waves, at, frames, toward)
     evened = sp.diags_array(_EVEN * area) @ wavier
     factor = _factored(sp.diags_array(weight) + rate.T @ weighted + wavier.T @ evened)
-    held = weight * before + evened.T @ (waves - wavier @ place)
+    held = weight * before + evened.T @ (off - wavier @ place)
     most = _MARGIN / radius
     form, capped = own, _capped(own + multiplier, most)
     for _ in range(_STEPS):
@@ -203,104 +201,9 @@ def _round(
     return place, multiplier
 
 
-class _Fit:
-    """Quadratics through the neighbours of the vertices `fitted` (i,), those `chosen` (v,) that have enough
-    of them: how what they say follows from places. That is linear in the neighbours' heights, with
-    coefficients (i, c, k) that a `measure` makes of their own coordinates (i, k, 3)."""
-
-    def __init__(self, surface: Surface, chosen: Flags) -> None:
-        count, faces = len(surface.vertices), surface.triangles
-        pairs = directed_edges(faces)
-        ones = np.ones(len(pairs))
-        next_to = sp.csr_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-        next_to = sp.csr_array(next_to + next_to.T)
-        near = sp.csr_array(next_to @ next_to + next_to)
-        near.setdiag(0.0)
-        near.eliminate_zeros()
-        size = np.diff(near.indptr)
-        self.fitted: Indices = np.flatnonzero((size >= 6) & chosen)
-        self.count = count
-        # Vertices with equally many neighbours are fitted together.
-        self._groups = [
-            (which, near.indices[near.indptr[self.fitted[which]][:, None] + np.arange(k)])
-            for k in np.unique(size[self.fitted])
-            if len(which := np.flatnonzero(size[self.fitted] == k))
-        ]
-        self._order = np.argsort(np.concatenate([which for which, _ in self._groups]))
-
-    def frames(self, normals: Reals) -> Reals:
-        """Axes (i, 3, 3) u, v, n as rows at the fitted vertices, from the normals (v, 3) of all."""
-        n = normals[self.fitted]
-        least = np.eye(3)[np.argmin(np.abs(n), axis=1)]
-        u = np.cross(least, n)
-        u /= np.linalg.norm(u, axis=1)[:, None]
-        return np.stack([u, np.cross(n, u), n], axis=1)
-
-    def found(self, measure: _Measure, at: Reals, frames: Reals) -> Reals:
-        """What is measured (i, c) of places (v, 3)."""
-        parts = []
-        for which, near in self._groups:
-            own = np.einsum("iab,ikb->ika", frames[which], at[near] - at[self.fitted[which], None])
-            parts.append(np.einsum("ick,ik->ic", measure(own), own[..., 2]))
-        return np.concatenate(parts)[self._order]
-
-    def by_distance(self, measure: _Measure, at: Reals, frames: Reals, toward: Reals) -> sp.csr_array:
-        """Its derivatives (c i, v) by distances that vertices move along `toward` (v, 3), at fixed
-        frames."""
-        rows, columns, values = [], [], []
-        for which, near in self._groups:
-            here = self.fitted[which]
-            own = np.einsum("iab,ikb->ika", frames[which], at[near] - at[here, None])
-            fit = measure(own)
-            risen = np.einsum("ib,ikb->ik", frames[which, 2], toward[near])
-            self_risen = np.einsum("ib,ib->i", frames[which, 2], toward[here])
-            kinds = fit.shape[1]
-            row = kinds * which[:, None] + np.arange(kinds)
-            rows += [np.broadcast_to(row[:, :, None], fit.shape).ravel(), row.ravel()]
-            columns += [np.broadcast_to(near[:, None, :], fit.shape).ravel(), np.repeat(here, kinds)]
-            values += [(fit * risen[:, None, :]).ravel(), (-fit.sum(axis=2) * self_risen[:, None]).ravel()]
-        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        return sp.csr_array(entries, shape=(kinds * len(self.fitted), self.count))
-
-    def most(self, at: Reals, normals: Reals) -> float:
-        """The largest principal curvature, 1/m."""
-        mean, apart = _principal(self.found(_second, at, self.frames(normals)))
-        return float((np.abs(mean) + apart).max(initial=0.0))
-
-
-def _second(own: Reals) -> Reals:
-    """C (i, 3, k): II_uu, II_uv, II_vv, 1/m, of the best quadratic through the vertex from the heights of
-    neighbours at own coordinates (i, k, 3)."""
-    columns, reach = _quadratics(own)
-    return np.linalg.pinv(columns, rcond=1e-6)[:, 2:] / reach[:, :, None] ** 2
-
-
-def _waves(own: Reals) -> Reals:
-    """(i, 1, k): the height at the vertex of the best quadratic from those of neighbours at own coordinates
-    (i, k, 3), over their mean squared distance, 1/m."""
-    columns, _ = _quadratics(own)
-    through = np.concatenate([np.ones_like(columns[..., :1]), columns], axis=2)
-    apart = np.mean(np.sum(own[..., :2] ** 2, axis=2), axis=1)
-    return np.linalg.pinv(through, rcond=1e-3)[:, :1] / apart[:, None, None]
-
-
-def _quadratics(own: Reals) -> tuple[Reals, Reals]:
-    """x, y, x²/2, xy, y²/2 (i, k, 5) of neighbours at own coordinates (i, k, 3), m, over how far they reach
-    (i, 1), m."""
-    reach = np.abs(own[..., :2]).max(axis=(1, 2))[:, None]
-    x, y = own[..., 0] / reach, own[..., 1] / reach
-    return np.stack([x, y, 0.5 * x * x, x * y, 0.5 * y * y], axis=2), reach
-
-
-def _principal(forms: Reals) -> tuple[Reals, Reals]:
-    """Mean of the two principal curvatures (i,) and half their difference."""
-    mean = 0.5 * (forms[:, 0] + forms[:, 2])
-    return mean, np.hypot(0.5 * (forms[:, 0] - forms[:, 2]), forms[:, 1])
-
-
 def _capped(forms: Reals, most: float) -> Reals:
     """The nearest forms (i, 3) whose eigenvalues are between -most and most."""
-    mean, apart = _principal(forms)
+    mean, apart = principal(forms)
     high, low = np.clip(mean + apart, -most, most), np.clip(mean - apart, -most, most)
     share = 0.5 * (high - low) / np.maximum(apart, 1e-300)
     half = 0.5 * (forms[:, 0] - forms[:, 2])
