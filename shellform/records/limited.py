@@ -197,24 +197,16 @@ def _stressed(
         usual, worst = (number(100.0 * each) for each in stress)
         return f"{usual} % of the strength, {worst} % in the worst"
 
-    found = words(own)
     cables = ", and tighten cables to their force before any load" if tight else ""
     last = "Fix supports last" if scaffold else "Raise it by a scaffold instead, fix supports last"
-    care = f"{found}, which breaks rods. {last}, where rods' ends lie on a scaffold{cables}"
-    provided = "with rods beyond their strength as built"
-    if then is not None:
-        found += f"; adjusted on site {words(then)}"
-        care += f": then {words(then)}"
-        if then[0] <= 1.0:
-            provided = _ADJUSTED
-        if then[1] > 1.0:
-            care += ". Where a rod bows out between two crossings, loosen it beside them and clamp it anew"
-    return Cell(
-        found,
-        None,
-        False,
-        caution=care if own[1] > 1.0 else "",
-        provided=provided if own[0] > 1.0 else "",
+    return _as_built(
+        own,
+        then,
+        words,
+        lambda stress: stress > 1.0,
+        care=f", which breaks rods. {last}, where rods' ends lie on a scaffold{cables}",
+        more="Where a rod bows out between two crossings, loosen it beside them and clamp it anew",
+        beyond="with rods beyond their strength as built",
     )
 
 
@@ -226,25 +218,43 @@ def _pulled(own: tuple[float, float], then: tuple[float, float] | None, most: fl
         usual, worst = map(newtons, pull)
         return f"{usual}, {worst} in the worst"
 
-    found = words(own)
-    care = (
-        f"{found}, more than the {newtons(most)} of cable.force_max. Tighten cables to their force before any "
-        "load, not to their length alone"
+    return _as_built(
+        own,
+        then,
+        words,
+        lambda pull: exceeds(pull, most),
+        care=f", more than the {newtons(most)} of cable.force_max. Tighten cables to their force before any "
+        "load, not to their length alone",
+        more="For more than that take stronger cables",
+        beyond="with cables beyond cable.force_max as built",
     )
-    provided = "with cables beyond cable.force_max as built"
+
+
+def _as_built(
+    own: tuple[float, float],
+    then: tuple[float, float] | None,
+    words: Callable[[tuple[float, float]], str],
+    over: Callable[[float], bool],
+    *,
+    care: str,
+    more: str,
+    beyond: str,
+) -> Cell:
+    """What structures as built bear, the median and the worst, and `then`, adjusted on site, in `words`. What
+    is `over` its limit in the worst asks for `care`, and for `more` where it is so when adjusted; in the
+    median the verdict says so: that the design holds adjusted, or `beyond` its limit."""
+    found, told = words(own), ""
+    caution, provided = found + care, beyond
     if then is not None:
-        found += f"; adjusted on site {words(then)}"
-        care += f": then {words(then)}"
-        if not exceeds(then[0], most):
-            provided = _ADJUSTED
-        if exceeds(then[1], most):
-            care += ". For more than that take stronger cables"
+        told = f"; adjusted on site {words(then)}"
+        caution += f": then {words(then)}{f'. {more}' if over(then[1]) else ''}"
+        provided = beyond if over(then[0]) else _ADJUSTED
     return Cell(
-        found,
+        found + told,
         None,
         False,
-        caution=care if exceeds(own[1], most) else "",
-        provided=provided if exceeds(own[0], most) else "",
+        caution=caution if over(own[1]) else "",
+        provided=provided if over(own[0]) else "",
     )
 
 

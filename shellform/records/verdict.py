@@ -83,8 +83,12 @@ def headline(record: VerdictRecord) -> str:
     if record.not_examined:
         return f"{name} is not examined: {how_many(len(record.not_examined), 'check is', 'checks are')} still open."
     care = f", with {how_many(len(record.cautions), 'caution', 'cautions')}" if record.cautions else ""
-    how = f", {' and '.join(record.provided)}" if record.provided else ""
-    return f"{name} holds{how}: all checks do{care}."
+    return f"{name} holds{provisos(record)}: all checks do{care}."
+
+
+def provisos(record: VerdictRecord) -> str:
+    """How the design holds, in words that follow "holds"; nothing where it bears being set out."""
+    return f", {' and '.join(record.provided)}" if record.provided else ""
 
 
 def _sentence(check: Check, cell: Cell) -> str:

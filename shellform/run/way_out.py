@@ -74,8 +74,6 @@ def nearest_buildable(
     share what was refused and raises InputError or NotConverged where it is refused again; `say` hears what
     is tried; `options` are those of the command with which `again` went on.
     """
-    from shellform.surface.readers.meshes import write_mesh
-
     left, before = list(shares), 0.0
     nearest: tuple[Faired, float] | None = None
     while left:
@@ -88,21 +86,37 @@ def nearest_buildable(
             # still rounder is still harder
             left = [between] if nearest is None and between > _CLOSE * before > 0.0 else []
             continue
-        try:
-            if float(found.change.max()) > _SLENDER:
-                with TemporaryDirectory() as place:
-                    trial = Path(place) / SURFACE
-                    write_mesh(trial, found.surface)
-                    again(read_surface(trial), share)  # the very file that is offered
-                left = [between] if nearest is None and between > _NEARER * before > 0.0 else []
-                nearest = found, wanted
-                continue
-        except (InputError, NotConverged) as error:
-            say(f"rounded to {wanted:.3g} m: {error}")
+        if _goes_on(found, share, wanted, again, say):
+            left = [between] if nearest is None and between > _NEARER * before > 0.0 else []
+            nearest = found, wanted
         else:
-            say(f"it is rounded to {wanted:.3g} m already")
-        before = share
+            before = share
     return None if nearest is None else Nearest(folder / SURFACE, _offer(*nearest, folder, options()))
+
+
+def _goes_on(
+    found: Faired,
+    share: float,
+    radius: float,
+    again: Callable[[Surface, float], object],
+    say: Callable[[str], None],
+) -> bool:
+    """Whether a surface that was rounded to a `share`, to a `radius`, m, isn't refused again; `say` hears why
+    it is."""
+    from shellform.surface.readers.meshes import write_mesh
+
+    if float(found.change.max()) <= _SLENDER:
+        say(f"it is rounded to {radius:.3g} m already")
+        return False
+    try:
+        with TemporaryDirectory() as place:
+            trial = Path(place) / SURFACE
+            write_mesh(trial, found.surface)
+            again(read_surface(trial), share)  # the very file that is offered
+    except (InputError, NotConverged) as error:
+        say(f"rounded to {radius:.3g} m: {error}")
+        return False
+    return True
 
 
 def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:

@@ -241,7 +241,7 @@ def test_waves_are_none_on_a_quadratic_and_follow_from_places_as_they_are_told_t
     upright = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     frames = fit.frames(upright)
     assert np.abs(fit.found(waves, points, frames)).max() < 1e-9
-    rate = fit.by_distance(waves, points, frames, upright)
+    _, rate = fit.found_by_distance(waves, points, frames, upright)
     off = np.random.default_rng(0).normal(size=len(points))
     there = fit.found(waves, points + off[:, None] * upright, frames)
     np.testing.assert_allclose(there[:, 0], rate @ off, rtol=1e-7, atol=1e-9)

@@ -31,7 +31,7 @@ from shellform.quantities import force_unit, number
 from shellform.records import words
 from shellform.records.check import UNASKED, Cell, Check, Subject
 from shellform.records.summary import Summary, VerdictRecord
-from shellform.records.verdict import asked, headline
+from shellform.records.verdict import asked, headline, provisos
 
 GENERATOR = "shellform report"  # in the page's head, so that it is known again
 VIEW = ("solid.js", "view.js", "section.js", "viewer.js")  # the scripts of the view alone
@@ -80,6 +80,7 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         "finished": summary.optimisation is not None,
         "verdict": run.verdict,
         "headline": headline(run.verdict),
+        "provisos": provisos(run.verdict),
         "kind": _kind(run.verdict),
         "asked": asked(run.checks, run.best),
         "answers": answers(

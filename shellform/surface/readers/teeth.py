@@ -91,9 +91,9 @@ def _smoothed(
     dropped, or a piece would break off."""
     placed, on_edge = points.copy(), np.zeros(len(points), dtype=bool)
     on_edge[_rim(faces, len(points))] = True
-    normals = rough_normals(points, faces)
+    tree, normals = cKDTree(points), rough_normals(points, faces)
     for loop, side in curves:
-        placed[loop] = _edge(points, normals, points[loop], side)
+        placed[loop] = _edge(tree, normals, points[loop], side)
     moved = (placed != points).any(axis=1)
     after = [np.roll(loop, -1) for loop, _ in curves]
     pieces = [placed[np.stack([loop, to, to], axis=1)] for (loop, _), to in zip(curves, after, strict=True)]
@@ -120,18 +120,18 @@ def _smoothed(
     return placed, faces, track
 
 
-def _edge(points: Reals, normals: Reals, corners: Reals, side: float) -> Reals:
-    """The places (n, 3) of the `corners` (n, 3) of a toothed edge once it is smooth, on the surface of these
-    points with their normals (v, 3)."""
+def _edge(tree: cKDTree, normals: Reals, corners: Reals, side: float) -> Reals:
+    """The places (n, 3) of the `corners` (n, 3) of a toothed edge once it is smooth, on the surface of the
+    points in the `tree` with their normals (v, 3)."""
     bending = _bending(corners)
     placed = _curve(corners, side, bending)
     moved = (placed != corners).any(axis=1)
-    placed[moved] = _onto(points, normals, placed[moved])
+    placed[moved] = _onto(tree, normals, placed[moved])
     plane = _plane(corners, _LEVEL * side)
     if plane is None:
         return placed
-    placed[moved] = _slid(points, normals, placed[moved], plane, side)
-    return np.where(moved[:, None], _projected(bending.through(placed), plane), corners)
+    placed[moved] = _slid(tree, normals, placed[moved], plane, side)
+    return np.where(moved[:, None], _projected(bending.through(placed, bending.weight), plane), corners)
 
 
 def _told(draft: Draft, placed: Reals, faces: Indices, track: Tree, edges: int) -> Draft:
@@ -205,11 +205,14 @@ class _Bending(Record):
     kept: Indices
     free: Flags
 
-    def through(self, corners: Reals, weight: Reals | None = None) -> Reals:
-        """The places (n, 3) on the curve that lies near the `corners` (n, 3), by their `weight` (n,) (None:
-        all alike)."""
+    @property
+    def weight(self) -> Reals:
+        """That of the corners (n,) to begin with: those that are free weigh alike, the others stay."""
+        return np.where(self.free, 1.0, _FIXED)
+
+    def through(self, corners: Reals, weight: Reals) -> Reals:
+        """The places (n, 3) on the curve that lies near the `corners` (n, 3), by their `weight` (n,)."""
         middle = corners.mean(axis=0)  # far from the origin rounding would bend it
-        weight = np.where(self.free, 1.0, _FIXED) if weight is None else weight
         return np.asarray(middle + _bent(corners - middle, weight, self.stiffness, self.kept))
 
 
@@ -228,7 +231,7 @@ def _bending(corners: Reals) -> _Bending:
 
 def _curve(corners: Reals, side: float, bending: _Bending) -> Reals:
     """The places (n, 3) on the smooth curve for the corners of a toothed edge with this median `side`, m."""
-    weight = np.where(bending.free, 1.0, _FIXED)
+    weight = bending.weight
     for _ in range(_TIGHTENINGS):
         placed = bending.through(corners, weight)
         off = np.linalg.norm(placed - corners, axis=1) / side
@@ -246,10 +249,10 @@ def _plane(corners: Reals, most: float) -> tuple[Reals, Reals] | None:
     return (middle, normal) if np.ptp(corners @ normal) <= most else None
 
 
-def _slid(points: Reals, normals: Reals, places: Reals, plane: tuple[Reals, Reals], most: float) -> Reals:
+def _slid(tree: cKDTree, normals: Reals, places: Reals, plane: tuple[Reals, Reals], most: float) -> Reals:
     """The `places` (k, 3) on or beside a surface, slid along it by `most`, m, at the most, to where it meets
     the plane."""
-    (middle, upright), tree, start = plane, cKDTree(points), places
+    (middle, upright), start = plane, places
     for _ in range(_SLIDES):
         normal = normals[tree.query(places, k=_NEAR)[1]].sum(axis=1)
         normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -258,7 +261,7 @@ def _slid(points: Reals, normals: Reals, places: Reals, plane: tuple[Reals, Real
         by = (places - middle) @ upright * steep / np.maximum(np.sum(level * level, axis=1), _STEEP)
         off = places + by[:, None] * level - start
         far = np.linalg.norm(off, axis=1)[:, None]
-        places = _onto(points, normals, start + off * np.minimum(1.0, most / np.maximum(far, 1e-300)))
+        places = _onto(tree, normals, start + off * np.minimum(1.0, most / np.maximum(far, 1e-300)))
     return places
 
 
@@ -326,10 +329,11 @@ def _turn(corners: Reals, half: int) -> Reals:
     )
 
 
-def _onto(points: Reals, normals: Reals, places: Reals) -> Reals:
+def _onto(tree: cKDTree, normals: Reals, places: Reals) -> Reals:
     """The `places` (k, 3) near a surface's edge, put onto it, or onto what continues it, along its normal: by
     the quadratic height function over the tangent plane that fits the vertices around best."""
-    near = cKDTree(points).query(places, k=min(_AROUND, len(points)))[1]
+    points = np.asarray(tree.data)
+    near = tree.query(places, k=min(_AROUND, len(points)))[1]
     result = np.empty_like(places)
     for k, (place, around) in enumerate(zip(places, near, strict=True)):
         normal = normals[around].sum(axis=0)

@@ -182,14 +182,14 @@ def _round(
     `before` (v,), m: how far the vertices had moved along the directions before."""
     at = here.vertices + place[:, None] * toward
     frames = fit.frames(rough_normals(at, here.triangles))
-    own, rate = fit.found(second, at, frames), fit.by_distance(second, at, frames, toward)
+    own, rate = fit.found_by_distance(second, at, frames, toward)
     given = own - (rate @ place).reshape(-1, 3)
     area = radius**4 * weight[fit.fitted]
     weighted = sp.diags_array(np.repeat(area, 3) * np.tile([1.0, 2.0, 1.0], len(area))) @ rate
-    off, wavier = fit.found(waves, at, frames)[:, 0], fit.by_distance(waves, at, frames, toward)
+    off, wavier = fit.found_by_distance(waves, at, frames, toward)
     evened = sp.diags_array(_EVEN * area) @ wavier
     factor = _factored(sp.diags_array(weight) + rate.T @ weighted + wavier.T @ evened)
-    held = weight * before + evened.T @ (off - wavier @ place)
+    held = weight * before + evened.T @ (off[:, 0] - wavier @ place)
     most = _MARGIN / radius
     form, capped = own, _capped(own + multiplier, most)
     for _ in range(_STEPS):

@@ -7,7 +7,7 @@ frames stay, in how far vertices move along given directions (fairing.py).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import scipy.sparse as sp
@@ -54,20 +54,17 @@ class Quadratics:
 
     def found(self, measure: Measure, at: Reals, frames: Reals) -> Reals:
         """What is measured (i, c) of places (v, 3)."""
-        parts = []
-        for which, near in self._groups:
-            own = np.einsum("iab,ikb->ika", frames[which], at[near] - at[self.fitted[which], None])
-            parts.append(np.einsum("ick,ik->ic", measure(own), own[..., 2]))
-        return np.concatenate(parts)[self._order]
+        return self._in_order([found for _, _, _, found in self._measured(measure, at, frames)])
 
-    def by_distance(self, measure: Measure, at: Reals, frames: Reals, toward: Reals) -> sp.csr_array:
-        """Its derivatives (c i, v) by distances that vertices move along `toward` (v, 3), at fixed
-        frames."""
-        rows, columns, values = [], [], []
-        for which, near in self._groups:
+    def found_by_distance(
+        self, measure: Measure, at: Reals, frames: Reals, toward: Reals
+    ) -> tuple[Reals, sp.csr_array]:
+        """What is measured (i, c) of places (v, 3), and its derivatives (c i, v) by distances that vertices
+        move along `toward` (v, 3), at fixed frames."""
+        parts, rows, columns, values = [], [], [], []
+        for which, near, fit, found in self._measured(measure, at, frames):
             here = self.fitted[which]
-            own = np.einsum("iab,ikb->ika", frames[which], at[near] - at[here, None])
-            fit = measure(own)
+            parts.append(found)
             risen = np.einsum("ib,ikb->ik", frames[which, 2], toward[near])
             self_risen = np.einsum("ib,ib->i", frames[which, 2], toward[here])
             kinds = fit.shape[1]
@@ -76,7 +73,22 @@ class Quadratics:
             columns += [np.broadcast_to(near[:, None, :], fit.shape).ravel(), np.repeat(here, kinds)]
             values += [(fit * risen[:, None, :]).ravel(), (-fit.sum(axis=2) * self_risen[:, None]).ravel()]
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        return sp.csr_array(entries, shape=(kinds * len(self.fitted), self.count))
+        shape = kinds * len(self.fitted), self.count
+        return self._in_order(parts), sp.csr_array(entries, shape=shape)
+
+    def _measured(
+        self, measure: Measure, at: Reals, frames: Reals
+    ) -> Iterator[tuple[Indices, Indices, Reals, Reals]]:
+        """Of vertices that are fitted together which they are (g,), their neighbours (g, k), the measure's
+        coefficients (g, c, k) and what it comes to (g, c)."""
+        for which, near in self._groups:
+            own = np.einsum("iab,ikb->ika", frames[which], at[near] - at[self.fitted[which], None])
+            fit = measure(own)
+            yield which, near, fit, np.einsum("ick,ik->ic", fit, own[..., 2])
+
+    def _in_order(self, parts: list[Reals]) -> Reals:
+        """What was found group by group, as the fitted vertices stand."""
+        return np.asarray(np.concatenate(parts)[self._order])
 
     def most(self, at: Reals, normals: Reals) -> float:
         """The largest principal curvature, 1/m."""
