@@ -24,6 +24,8 @@ from shellform.gridshell.tolerances import Tolerances as Tolerances
 from shellform.net import refusal as refusal
 from shellform.net.chebyshev import NetTuning as NetTuning
 from shellform.net.chebyshev import pull_net as pull_net
+from shellform.net.cover import BarePatch as BarePatch
+from shellform.net.cover import Cover as Cover
 from shellform.net.grid import Grid as Grid
 from shellform.net.grid import GridRod as GridRod
 from shellform.net.net import EdgeLine as EdgeLine

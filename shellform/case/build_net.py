@@ -189,6 +189,7 @@ def net_settings(entry: NetEntry, gap: float) -> NetSettings:
         merge=entry.merge,
         ground=entry.ground,
         outline=entry.outline,
+        uncovered_max=entry.uncovered_max,
     )
 
 
@@ -218,6 +219,8 @@ def net_record(
         edges=edge_records(net),
         spacing_v=net.grid.spacing_v,
         **net.quality.summary(),
+        uncovered_share=None if net.cover is None else net.cover.share,
+        uncovered=() if net.cover is None else net.cover.patches,
         notes=tuple(note.text for note in net.notes),
         angle=angle,
         offset=offset,

@@ -113,6 +113,9 @@ class NetEntry(Entry):
     outline: list[tuple[float, float]] | None = Field(
         None, description="closed plan curve at which rods end, m"
     )
+    uncovered_max: Share = Field(
+        0.02, description="share of the surface that may lie farther than 0.75 spacings from any rod"
+    )
 
     @model_validator(mode="after")
     def _guided(self) -> NetEntry:

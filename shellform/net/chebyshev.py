@@ -4,7 +4,8 @@ From an origin on the surface (lattice_origin.py) the compass method (compass.py
 lattice cover it and a margin around, on the surface as it goes on past its edge. The flat grid of these rods
 is pulled onto it by sliding springs (pull.py), or laid as the compass has it, cut at the edge (trim.py) and
 measured (quality.py). A pulled grid draws itself in: where it leaves the rim bare, the margin is made wider
-and everything begins anew; past the widest one no net covers the surface.
+and everything begins anew; past the widest one no net covers the surface. Where the trimmed grid leaves a
+part of it bare (cover.py), rods of a single joint stay too, if less is with them.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from numpy.typing import ArrayLike
 from shellform.arrays import Reals, reals
 from shellform.errors import InputError, require_angle, require_count, require_number, typed
 from shellform.net.compass import Finder, covering_lattice
+from shellform.net.cover import NOTABLE, UNCOVERED, Cover, cover, refuse_bare
 from shellform.net.grid import Grid, lattice_grid
 from shellform.net.lattice_origin import origin_at, origin_of_guides
 from shellform.net.net import Net
@@ -93,6 +95,7 @@ class NetSettings:
     merge: float = MERGE
     ground: float | None = None
     outline: ArrayLike | None = None
+    uncovered_max: float = UNCOVERED
     tuning: NetTuning = field(default_factory=NetTuning)
 
     @property
@@ -118,6 +121,7 @@ def pull_net(
     merge: float = MERGE,
     ground: float | None = None,
     outline: ArrayLike | None = None,
+    uncovered_max: float = UNCOVERED,
     tuning: NetTuning | None = None,
     progress: Pulling | None = None,
 ) -> Net:
@@ -128,7 +132,8 @@ def pull_net(
       `offset` of that from the middle of the plan, in spacings along u and v; or along `guides`, two curves
       in plan, (k, 2) m each, that cross at the origin and along which the u rod and the v rod through it run.
     - Rods end at the surface's edge, at the `ground` level, m, and at the closed curve `outline` (k, 2), m in
-      plan; joints nearer to the end than `merge` spacings are left out.
+      plan; joints nearer to the end than `merge` spacings are left out. Of the surface the share
+      `uncovered_max` may lie farther than three quarters of the spacing from any rod.
     - The `method` "pull" relaxes the grid, of so many `elements` a segment, on sliding springs of
       `spring_density`, EI/s³, rising, and `shear_stiffness`, EI/s a radian (pull.py), from the compass net or
       the flat grid (`start`); "compass" leaves the compass net as it is. `tuning`: of the numbers behind it.
@@ -149,6 +154,7 @@ def pull_net(
         merge=merge,
         ground=ground,
         outline=outline,
+        uncovered_max=uncovered_max,
         tuning=tuning or NetTuning(),
     )
     return net_at(surface, settings, angle=angle, offset=offset, progress=progress)
@@ -213,7 +219,10 @@ def net_at(
         except Uncovered as error:
             bare = error.rods
             continue
-        return _net(surface, finder, grid, pulled, trimmed)
+        covered = cover(surface, trimmed.grid, trimmed.state, limits.within)
+        if covered.patches:
+            trimmed, covered = _less_bare(surface, finder, grid, pulled, settings, trimmed, covered)
+        return _net(finder, grid, pulled, trimmed, covered, settings.uncovered_max)
     raise _short(bare, angle)
 
 
@@ -258,6 +267,10 @@ def _check(surface: Surface, settings: NetSettings) -> None:
     require_count(settings.elements, where="net.elements", give="beam elements a segment, such as 4")
     give = "a share of the spacing, such as 0.2"
     require_number(settings.merge, above=0.0, below=0.5, where="net.merge", give=give, share=True)
+    give = f"a share of the surface, such as {UNCOVERED:g}"
+    require_number(
+        settings.uncovered_max, least=0.0, most=1.0, where="net.uncovered_max", give=give, share=True
+    )
     give = f"EI/s a radian, such as {SHEAR_STIFFNESS:g}"
     require_number(
         settings.shear_stiffness,
@@ -310,26 +323,48 @@ def _densities(given: Sequence[float] | None, start: Start) -> Sequence[float]:
     return given
 
 
-def _net(surface: Surface, finder: Finder, oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> Net:
+def _less_bare(
+    surface: Surface,
+    finder: Finder,
+    oversized: Grid,
+    pulled: Pulled,
+    settings: NetSettings,
+    trimmed: Trimmed,
+    covered: Cover,
+) -> tuple[Trimmed, Cover]:
+    """The grid trimmed so that rods of a single joint stay too, and what it covers, where that is worth it;
+    else as it is."""
+    limits = _limits(settings)
+    more = trim(oversized, pulled.state, finder, merge=settings.merge, limits=limits, fewest=1)
+    found = cover(surface, more.grid, more.state, limits.within)
+    if covered.bare - found.bare < NOTABLE * more.grid.spacing * more.grid.spacing_v:
+        return trimmed, covered
+    return more, found
+
+
+def _net(
+    finder: Finder, oversized: Grid, pulled: Pulled, trimmed: Trimmed, covered: Cover, uncovered_max: float
+) -> Net:
     try:
-        return _measured(surface, finder, oversized, pulled, trimmed)
+        net = _measured(finder, oversized, pulled, trimmed, covered)
+        refuse_bare(covered, uncovered_max, net.spacing)
+        return net
     except NoNet as error:
         error.factorisations = pulled.factorisations
         raise
 
 
-def _measured(surface: Surface, finder: Finder, oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> Net:
+def _measured(finder: Finder, oversized: Grid, pulled: Pulled, trimmed: Trimmed, covered: Cover) -> Net:
     grid, state = trimmed.grid, trimmed.state
     refuse_folds(finder, grid, state)
     own = trimmed.origin >= 0
     force = np.where(own, pulled.pull[trimmed.origin], 0.0)
-    quality = measure(
-        surface, finder, grid, state, _curvature(oversized, pulled, trimmed), force, pulled.factorisations
-    )
+    curvature = _curvature(oversized, pulled, trimmed)
+    quality = measure(finder, grid, state, curvature, force, spent=pulled.factorisations, bare=covered.bare)
     refuse_distance(quality, grid, state)
     near = nearness(quality, grid, state)
     told = (NetNote(NoteKind.NEAR, near),) if near else ()
-    return Net(grid, state, trimmed.supports, quality, (*trimmed.notes, *told))
+    return Net(grid, state, trimmed.supports, quality, covered, (*trimmed.notes, *told))
 
 
 def _curvature(oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> Reals:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Indices, Reals, Record, indices, reals
+from shellform.net.cover import Cover
 from shellform.net.grid import Grid, crossing_points
 from shellform.net.notes import NetNote
 from shellform.net.quality import Quality
@@ -65,7 +66,8 @@ class Net(Record):
     - `grid`: flat; `target`: its state on the surface, (n,) nodes.
     - `supports` (s,): the nodes that are held, which are the rods' ends, but for those on edge beams and free
       ones (edges.py), and the edge beams' feet.
-    - `quality`: how good it is; `notes`: what was left out.
+    - `quality`: how good it is; `cover`: where it leaves the surface bare (None: not known of older ones);
+      `notes`: what was left out.
     - `attempts` at it, the last of which gave it; none where the first did.
     - `edges`: the edge beams; `stretches`: what the edge is, part after part (none: not asked).
     """
@@ -74,6 +76,7 @@ class Net(Record):
     target: State
     supports: Indices
     quality: Quality
+    cover: Cover | None = None
     notes: tuple[NetNote, ...] = ()
     attempts: tuple[Attempt, ...] = ()
     edges: tuple[EdgeLine, ...] = ()
@@ -118,6 +121,11 @@ class Net(Record):
     def spacing(self) -> float:
         """m."""
         return self.grid.spacing
+
+    @property
+    def bare_cells(self) -> float:
+        """How many of its cells the surface beyond its rods would fill."""
+        return self.quality.uncovered_area / (self.grid.spacing * self.grid.spacing_v)
 
     @property
     def crossings(self) -> Reals:

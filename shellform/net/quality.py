@@ -21,15 +21,10 @@ from shellform.net.grid import Grid, cells, crossing_points, neighbours
 from shellform.net.refusal import NoNet, Reason
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
-from shellform.surface.shape.target import Surface
-from shellform.surface.shape.tree import Tree
-from shellform.surface.shape.triangles import triangle_areas
 
 _FAR = 0.1  # of the spacing: a net farther from the surface is refused
 SPACING_ERROR = 0.005  # of the spacing: more is told, and not proposed (2.9 spacings of radius, or 100 gaps)
 _OVERLAP = 0.4  # of the spacing: nearer to each other two crossings that aren't neighbours lie on one another
-_BARE = 0.75  # of the spacing: the middle of a cell lies half a spacing from the next rod
-_SAMPLE = 0.25  # of the spacing, between points at which the cover is looked for
 
 
 @dataclass(frozen=True)
@@ -43,7 +38,7 @@ class NetNumbers:
       `curvature_in_plane_max`: its parts out of and in the surface's tangent plane.
     - `pull_max`, `pull_mean`: what the springs still pull, in EI/s² of the rods, the paper's measure of how
       forced the grid is.
-    - `uncovered_area`, m²: farther from any rod than three quarters of the spacing.
+    - `uncovered_area`, m²: farther from any rod than three quarters of the spacing (cover.py).
     - `gaussian_curvature`, rad: of the surface, added up over the net's cells.
     - `factorisations` that the pulling took.
     """
@@ -88,10 +83,10 @@ MAPS = ("distance", "shear_angle", "spacing_error", "curvature", "pull")
 
 
 def measure(
-    surface: Surface, finder: Finder, grid: Grid, state: State, curvature: Reals, pull: Reals, spent: int
+    finder: Finder, grid: Grid, state: State, curvature: Reals, pull: Reals, *, spent: int, bare: float
 ) -> Quality:
     """The quality of the trimmed grid in its state; `curvature` (m, 2, 2) of its rod elements, `pull` (n,) on
-    its nodes.
+    its nodes; `spent`, factorisations; `bare`, m² of the surface.
     """
     points = crossing_points(grid, state)
     distance = finder.foot(points).distance
@@ -111,7 +106,7 @@ def measure(
         curvature_in_plane_max=float(bent[..., 1].max()),
         pull_max=float(pull.max(initial=0.0)),
         pull_mean=float(pull.mean()),
-        uncovered_area=uncovered(surface, grid, state),
+        uncovered_area=bare,
         gaussian_curvature=float(gaussian(finder, corners).sum()) if len(corners) else 0.0,
         factorisations=spent,
         distance=distance,
@@ -129,28 +124,6 @@ def shear_angles(grid: Grid, state: State) -> Reals:
     )
     cosine = np.abs(np.sum(first * second, axis=1))
     return np.asarray(np.arccos(np.clip(cosine, 0.0, 1.0)))
-
-
-def uncovered(surface: Surface, grid: Grid, state: State) -> float:
-    """The surface's area, m², farther from any rod than three quarters of the spacing."""
-    ends = state.positions[grid.rod_ends]
-    rods = Tree(np.stack([ends[:, 0], ends[:, 1], ends[:, 1]], axis=1))
-    corner = surface.vertices[surface.triangles]
-    longest = float(np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max())
-    parts = int(np.clip(np.ceil(longest / (_SAMPLE * grid.scale)), 1, 32))
-    i, j = (each.ravel() for each in np.meshgrid(np.arange(parts), np.arange(parts)))
-    up, down = i + j < parts, i + j < parts - 1
-    shares = (
-        np.vstack([np.column_stack([i, j])[up] + 1.0 / 3.0, np.column_stack([i, j])[down] + 2.0 / 3.0])
-        / parts
-    )
-    weights = np.column_stack([1.0 - shares.sum(axis=1), shares])
-    area = triangle_areas(surface.vertices, surface.triangles)
-    bare = 0.0
-    for weight in weights:  # one sample of every triangle at a time keeps memory small
-        away = rods.nearest(np.tensordot(weight, corner, axes=(0, 1)))[2]
-        bare += float(area[away > _BARE * grid.scale].sum()) / len(weights)
-    return bare
 
 
 def refuse_folds(finder: Finder, grid: Grid, state: State) -> None:

@@ -24,6 +24,7 @@ class Reason(Enum):
     OFF = "the net stays off the surface"
     NEAR = "crossings come nearer than their spacing"
     EMPTY = "no rod keeps two joints"
+    BARE = "too much of the surface lies beyond the rods"
 
 
 class NoNet(InputError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from shellform.arrays import read_arrays
 from shellform.errors import InputError
+from shellform.net.cover import BarePatch, Cover
 from shellform.net.grid import Grid, GridRod
 from shellform.net.net import EdgeLine, Net, Stretch
 from shellform.net.notes import NetNote, NoteKind
@@ -74,6 +76,7 @@ def save_net(path: Path, net: Net) -> None:
                     "spacing_v": grid.spacing_v,
                     "gap": grid.gap,
                     "quality": net.quality.summary(),
+                    **({} if net.cover is None else {"cover": asdict(net.cover)}),
                     "notes": [[note.kind.value, note.text] for note in net.notes],
                     "indices": [rod.index for rod in grid.rods],
                     **({"attempts": [_row(each) for each in net.attempts]} if net.attempts else {}),
@@ -95,6 +98,11 @@ def save_net(path: Path, net: Net) -> None:
         arrays[f"rod_{name}"] = np.concatenate(pieces)
         arrays[f"rod_{name}_ends"] = np.cumsum([len(piece) for piece in pieces])
     write_arrays(path, **arrays)
+
+
+def _cover(saved: dict[str, Any]) -> Cover:
+    patches = (BarePatch(each["area"], tuple(each["place"]), each["away"]) for each in saved["patches"])
+    return Cover(saved["area"], tuple(patches))
 
 
 def _note(saved: str | list[str]) -> NetNote:
@@ -143,6 +151,7 @@ def load_net(path: Path) -> Net:
             target=target,
             supports=data["supports"],
             quality=quality,
+            cover=_cover(meta["cover"]) if "cover" in meta else None,
             notes=notes,
             attempts=attempts,
             edges=edges,

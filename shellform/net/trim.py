@@ -4,7 +4,7 @@ Each rod is cut where it leaves what is to be built; its parts inside become rod
 cuts are found on the bent rod by the Illinois method, so that supports lie on the edge. A joint nearer to an
 end than a set fraction of the spacing is left out, so that no end piece is so short that its support and the
 joint fight. A rod that runs beside the edge is left out with its joints, where most of it keeps none: it
-would bend out there as it likes; so is one on which fewer than two joints remain.
+would bend out there as it likes; so is one on which fewer than two joints remain, unless one is to do.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals, Record
+from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import how_many
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, GridRod
@@ -27,7 +27,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.network import connected
 
 _SHORTEST_ELEMENT = 0.35  # of the ordinary element's length; a shorter last one is joined to its neighbour
-_FEWEST = 2  # joints on a rod
+FEWEST = 2  # joints on a rod
 # a rod that has no joint over more than so many spacings, and over more than this share of it, runs beside
 # the edge
 _FREE, _FREE_SHARE = 2.5, 0.4
@@ -85,7 +85,14 @@ class Limits(Record):
 
     def past(self, finder: Finder, points: Reals) -> Reals:
         """How far (k,), m, points on the net lie past the nearest limit; negative inside."""
-        result = finder.past_edge(finder.foot(points))
+        return np.maximum(finder.past_edge(finder.foot(points)), self._beyond(points))
+
+    def within(self, points: Reals) -> Flags:
+        """Which (k,) of points on the surface lie within the ground's level and the curve."""
+        return self._beyond(points) < 0.0
+
+    def _beyond(self, points: Reals) -> Reals:
+        result = np.full(len(points), -np.inf)
         if self.ground is not None:
             result = np.maximum(result, self.ground - points[:, 2])
         if self.plan is not None:
@@ -95,9 +102,11 @@ class Limits(Record):
         return np.asarray(result)
 
 
-def trim(grid: Grid, state: State, finder: Finder, *, merge: float, limits: Limits) -> Trimmed:
+def trim(
+    grid: Grid, state: State, finder: Finder, *, merge: float, limits: Limits, fewest: int = FEWEST
+) -> Trimmed:
     """The part of the pulled `grid` inside the surface's edge and the `limits`; joints nearer to them than
-    `merge` spacings are left out.
+    `merge` spacings are left out, and so are rods with less than the `fewest` joints.
 
     Raises Uncovered where the grid isn't large enough, InputError where nothing useful remains.
     """
@@ -106,7 +115,7 @@ def trim(grid: Grid, state: State, finder: Finder, *, merge: float, limits: Limi
     bare = sum(piece.start < 0.0 or piece.end < 0.0 for piece in pieces)
     if bare:
         raise Uncovered(bare)
-    kept, notes = _keep(grid, pieces, merge)
+    kept, notes = _keep(grid, pieces, merge, fewest)
     return _rebuild(grid, state, kept, notes)
 
 
@@ -191,7 +200,7 @@ def _where_zero(
 
 
 def _keep(
-    grid: Grid, pieces: list[_Piece], merge: float
+    grid: Grid, pieces: list[_Piece], merge: float, fewest: int
 ) -> tuple[list[tuple[_Piece, list[int]]], list[NetNote]]:
     """The pieces that remain, each with its joints, and what is to be said about the others."""
     joints = [dict(piece.joints()) for piece in pieces]
@@ -216,7 +225,7 @@ def _keep(
     for each in loose:
         remaining -= each.keys()
     while True:
-        poor = [each for each in joints if 0 < len(remaining & each.keys()) < _FEWEST]
+        poor = [each for each in joints if 0 < len(remaining & each.keys()) < fewest]
         if not poor:
             break
         for each in poor:
@@ -247,12 +256,19 @@ def _keep(
         )
         notes.append(NetNote(NoteKind.RODS, beside))
     if len(kept) + len(loose) < len(pieces):
+        without = f"with fewer than {fewest} joints" if fewest > 1 else "without a joint"
         few = how_many(
             len(pieces) - len(kept) - len(loose),
-            f"rod with fewer than {_FEWEST} joints was left out",
-            f"rods with fewer than {_FEWEST} joints were left out",
+            f"rod {without} was left out",
+            f"rods {without} were left out",
         )
         notes.append(NetNote(NoteKind.RODS, few))
+    single = sum(len(joints) < FEWEST for _, joints in kept)
+    if single:
+        stay = how_many(single, "rod of a single joint stays", "rods of a single joint stay")
+        notes.append(
+            NetNote(NoteKind.RODS, f"{stay}: without, more of the surface would lie beyond the rods")
+        )
     return kept, notes
 
 

@@ -11,6 +11,7 @@ from enum import Enum, auto
 
 from shellform.quantities import newtons, number
 
+ADJUSTED = "adjusted on site"  # as terminal, page and the how-to call it
 SLACK = 1e-3  # of a limit: what the optimiser itself lets pass
 _FINER = 4  # digits, that tell what is farther off than that from the limit
 

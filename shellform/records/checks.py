@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
+from shellform.net.cover import BARE, NOTABLE, patches_told
 from shellform.optimiser.limits_told import AT_LEAST, share_of_limit
 from shellform.quantities import number
 from shellform.records.as_built import critical_checks, guide_checks, standing_checks
@@ -21,7 +22,7 @@ from shellform.records.limited import Bounds, limited
 from shellform.records.optimisation import OptimisationRecord
 from shellform.records.raising import easiest
 from shellform.records.remedies import RodsOf, allow, allow_count
-from shellform.records.summary import DesignRecord, LoadRecord, Summary
+from shellform.records.summary import DesignRecord, LoadRecord, NetRecord, Summary
 from shellform.records.words import borne_words, constraint_titles, load_title
 
 BUILT = ("optimised", "rounded", "polished")  # in the order in which they are made
@@ -90,6 +91,7 @@ def checks(
             loads,
         ),
         *_of_edge_beams(judged),
+        *_covered(summary.net, bounds.uncovered, judged.designs),
         *_raised(judged, required=bounds.safety is not None and bounds.safety.required),
         Check("Rods bent into the shape (1)", "up to 100 % of the curvature they bear", bent),
         *limited(rows, rods, bounds),
@@ -113,6 +115,28 @@ def _of_edge_beams(judged: _Judged) -> list[Check]:
     return judged.under(
         "Edge beams", limit, _if_standing(lambda row, rods: _edged(row)), list(judged.factors)
     )
+
+
+def _covered(net: NetRecord | None, most: float, designs: Sequence[str]) -> list[Check]:
+    """How much of the surface lies beyond the rods, which is the same for all designs."""
+    if net is None or net.uncovered_share is None:
+        return []
+    area, share = f"{number(net.uncovered_area, 2)} m²", number(100.0 * net.uncovered_share, 2)
+    cells = net.uncovered_area / (net.spacing * net.spacing_v)
+    care = (
+        f"{area} of the surface lie farther than {BARE:g} spacings from any rod: {patches_told(net.uncovered)}. Formwork needs "
+        "props of its own there"
+    )
+    cell = Cell(
+        f"{share} %, {area}" if net.uncovered else "none",
+        net.uncovered_share <= most,
+        remedy="Another net.angle or net.offset, or a smaller net.spacing, covers more.",
+        caution=care if cells >= NOTABLE else "",
+        provided=f"with {area} beyond its rods" if cells >= 1.0 else "",
+    )
+    return [
+        Check("Surface beyond the rods", f"up to {100.0 * most:.3g} % of it", dict.fromkeys(designs, cell))
+    ]
 
 
 def _raised(judged: _Judged, *, required: bool) -> list[Check]:

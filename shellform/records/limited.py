@@ -10,13 +10,21 @@ from dataclasses import dataclass, field
 
 from shellform.quantities import newtons, number
 from shellform.records.as_built import AsBuilt
-from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, on_worse_mesh, quantity
+from shellform.records.check import (
+    ADJUSTED,
+    SLACK,
+    UNASKED,
+    UNKNOWN,
+    Cell,
+    Check,
+    below,
+    on_worse_mesh,
+    quantity,
+)
 from shellform.records.raising import SCAFFOLD, easiest
 from shellform.records.remedies import RodSizes, RodsOf, allow, allow_less, rounded_up
 from shellform.records.summary import DesignRecord, LoadRecord
 from shellform.records.words import exceeds, load_title
-
-_ADJUSTED = "adjusted on site"  # as terminal, page and the how-to call it
 
 
 @dataclass(frozen=True)
@@ -26,7 +34,8 @@ class Bounds:
     `deviation`, m, under the design load, of the perfect structure and as `built`, and `unloaded`; `stress`
     over strength, connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull
     `slack`, N, of cables under the `slack_loads`, and by load the least `critical` factor; what is asked of
-    structures as built (`safety`); and how the case gives its `rods`' size."""
+    structures as built (`safety`); how the case gives its `rods`' size; and which share of the surface may
+    lie beyond the rods (`uncovered`)."""
 
     force: float
     misfit: float
@@ -42,6 +51,7 @@ class Bounds:
     critical: Mapping[str, float] = field(default_factory=dict)
     safety: AsBuilt | None = None
     rods: RodSizes | None = None
+    uncovered: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -248,7 +258,7 @@ def _as_built(
     if then is not None:
         told = f"; adjusted on site {words(then)}"
         caution += f": then {words(then)}{f'. {more}' if over(then[1]) else ''}"
-        provided = beyond if over(then[0]) else _ADJUSTED
+        provided = beyond if over(then[0]) else ADJUSTED
     return Cell(
         found + told,
         None,

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from shellform.errors import Damaged, InputError
+from shellform.net.cover import BarePatch
 from shellform.net.quality import NetNumbers
 from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.failures import FailureRecord, RareRecord
@@ -55,16 +56,19 @@ class EdgeRecord:
 @dataclass(frozen=True)
 class NetRecord(NetNumbers):
     """The net: how many `crossings`, `rods` and `supports`, at a `spacing` and one along rods v, `spacing_v`,
-    m; what was left out of it (`notes`, a sentence each); `rod_radius_max`, m, the farthest that a rod's
-    outermost fibre may lie from its axis; `curvature_limit`, 1/m, that the rods bear as the net bends them,
-    and `curvature_utilisation`, how much of it the net uses; its `angle`, rad, and `offset`, in spacings, on
-    the surface; and its `edges`."""
+    m; which share of what it is to cover lies beyond the rods (`uncovered_share`; None: not known of older
+    runs), in which patches (`uncovered`); what was left out of it (`notes`, a sentence each);
+    `rod_radius_max`, m, the farthest that a rod's outermost fibre may lie from its axis; `curvature_limit`,
+    1/m, that the rods bear as the net bends them, and `curvature_utilisation`, how much of it the net uses;
+    its `angle`, rad, and `offset`, in spacings, on the surface; and its `edges`."""
 
     spacing: float
     crossings: int
     rods: int
     supports: int
     spacing_v: float
+    uncovered_share: float | None = None
+    uncovered: tuple[BarePatch, ...] = ()
     notes: tuple[str, ...] = ()
     rod_radius_max: float | None = None
     curvature_limit: float | None = None

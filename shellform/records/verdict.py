@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shellform.errors import how_many
-from shellform.records.check import UNASKED, Cell, Check
+from shellform.records.check import ADJUSTED, UNASKED, Cell, Check
 from shellform.records.checks import BUILT
 from shellform.records.summary import VerdictRecord
 from shellform.records.words import run_on
@@ -39,9 +39,10 @@ def verdict(found: Sequence[Check], design: str) -> VerdictRecord:
     broken = tuple(_sentence(check, check.cells[design]) for check in failed(found, design))
     unknown = tuple(check.name for check in open_checks(found, design))
     cells = [check.cells.get(design, UNASKED) for check in found]
-    provided = tuple(dict.fromkeys(cell.provided for cell in cells if cell.provided))
+    provided = dict.fromkeys(cell.provided for cell in cells if cell.provided)
+    in_order = tuple(sorted(provided, key=lambda each: each != ADJUSTED))  # before what it is adjusted with
     return VerdictRecord(
-        design, not broken and not unknown, broken, unknown, _cautions(found, design), provided
+        design, not broken and not unknown, broken, unknown, _cautions(found, design), in_order
     )
 
 
@@ -88,7 +89,7 @@ def headline(record: VerdictRecord) -> str:
 
 def provisos(record: VerdictRecord) -> str:
     """How the design holds, in words that follow "holds"; nothing where it bears being set out."""
-    return f", {' and '.join(record.provided)}" if record.provided else ""
+    return f", {', '.join(record.provided)}" if record.provided else ""
 
 
 def _sentence(check: Check, cell: Cell) -> str:

@@ -192,7 +192,7 @@ def draw_maps(run: Run, *, report: Report = unheard) -> bool:
             report(Event("figures", f"no pictures of the {quantity}: {error}", Kind.NOTE))
     for view in ("top", "front", "side"):
         draw_designs(run, Wish(run.best, "design", view=view), report=report)
-    draw_net(run.net, run.folder / "figures")
+    draw_net(run.net, run.folder / "figures", run.surface)
     return True
 
 

@@ -22,6 +22,7 @@ from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError, require_file
 from shellform.gridshell.joints import usual_gap
 from shellform.net.chebyshev import NetSettings
+from shellform.net.cover import patches_told
 from shellform.net.edges import stand
 from shellform.net.net import Net
 from shellform.net.orientation import oriented_net
@@ -31,7 +32,7 @@ from shellform.quantities import number
 from shellform.records import stages
 from shellform.records.files import plain
 from shellform.records.progress import Event, Kind, Report
-from shellform.records.summary import Summary, SurfaceRecord, write_summary
+from shellform.records.summary import NetRecord, Summary, SurfaceRecord, write_summary
 from shellform.run.figures import pictures_possible
 from shellform.run.folder import alone, refuse_overwriting
 from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
@@ -156,7 +157,7 @@ def labelled_net(found: Summary) -> dict[str, str]:
         "off their spacing": f"{100.0 * net.spacing_error_max:.2f} % at most",
         "sharpest angle": f"{math.degrees(net.shear_angle_min):.3g}° between two rods",
         "largest curvature": f"{number(net.curvature_max)} 1/m of a rod",
-        "area without rods": f"{number(net.uncovered_area)} m²",
+        "area without rods": _uncovered(net),
     }
     if net.angle is not None:
         lines["angle of u rods"] = f"{math.degrees(net.angle):.4g}° against the x axis"
@@ -165,6 +166,13 @@ def labelled_net(found: Summary) -> dict[str, str]:
         lengths[each.kind] = lengths.get(each.kind, 0.0) + each.length
     lines["edge"] = ", ".join(f"{number(length)} m {kind}" for kind, length in lengths.items())
     return lines | {f"note {k}": text for k, text in enumerate(net.notes, 1)}
+
+
+def _uncovered(net: NetRecord) -> str:
+    if not net.uncovered:
+        return "none"
+    share = 100.0 * (net.uncovered_share or 0.0)
+    return f"{number(net.uncovered_area, 2)} m², {number(share, 2)} %: {patches_told(net.uncovered)}"
 
 
 class _Asked(Entry):
@@ -249,7 +257,7 @@ def net_alone(
     if pictures_possible(report):
         from shellform.output.pictures.net_maps import draw_net
 
-        draw_net(net, folder / "figures")
+        draw_net(net, folder / "figures", surface)
     return summary
 
 

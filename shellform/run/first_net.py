@@ -19,12 +19,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shellform.net.chebyshev import NetSettings, NetTuning, net_at
+from shellform.net.cover import NOTABLE
 from shellform.net.edges import Edges, stand
 from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.orientation import cost
 from shellform.net.quality import refuse_nearness
 from shellform.net.refusal import NoNet, Stalled
+from shellform.quantities import number
 from shellform.run.first_trial import ELEMENTS
 from shellform.run.sizes import MOST_CROSSINGS, Placed
 from shellform.structure.elements.threads import in_turn
@@ -223,8 +225,16 @@ def net_told(placed: Placed, spacing: float) -> str:
     """What the net of a `spacing`, m, is."""
     return (
         f"net at {placed.angle:g}° and {spacing:g} m: {len(placed.net.grid.lattice)} crossings, "
-        f"rods bend to a radius of {bends_to(placed.net):.3g} m"
+        f"rods bend to a radius of {bends_to(placed.net):.3g} m{bare_told(placed.net)}"
     )
+
+
+def bare_told(net: Net) -> str:
+    """How much of the surface lies beyond its rods, to follow what else is said of it; nothing where that is
+    little."""
+    if net.bare_cells < NOTABLE:
+        return ""
+    return f", {number(net.quality.uncovered_area, 2)} m² of the surface lie beyond them"
 
 
 def bends_to(net: Net) -> float:
@@ -262,7 +272,8 @@ def _taken(error: NoNet | Stalled) -> int:
 
 
 def _least_bent(nets: Sequence[Placed]) -> Placed:
-    """The net whose rods bend least; among those alike that of the least cost."""
+    """The net whose rods bend least; among those alike that of the least cost, of those that leave less than
+    a cell bare if there are any."""
     least = min(each.net.quality.curvature_max for each in nets)
     alike = [each for each in nets if each.net.quality.curvature_max <= (1.0 + _ALIKE) * least]
-    return min(alike, key=lambda each: cost(each.net))
+    return min(alike, key=lambda each: (each.net.bare_cells >= 1.0, cost(each.net)))

@@ -45,6 +45,7 @@ def run_checks(run: Run) -> list[Check]:
             keeps=limits.utilisation is not None,
             least=run.case.optimise.radius_min,
         ),
+        uncovered=run.case.net.uncovered_max,
     )
     found = checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
     if run.summary.sketch:

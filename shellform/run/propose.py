@@ -27,7 +27,7 @@ from shellform.run.first_design import finished_design, first_design
 from shellform.run.first_edges import TUBES
 from shellform.run.first_finish import far_told
 from shellform.run.first_look import surface_entry
-from shellform.run.first_net import Allowance, bends_to, larger
+from shellform.run.first_net import Allowance, bare_told, bends_to, larger
 from shellform.run.first_refusal import WayOut, steadier_on_walls, with_ways_out
 from shellform.run.first_steadier import strays, strays_told
 from shellform.run.first_trial import (
@@ -199,7 +199,8 @@ def _written(
     return {
         "size": size_text(surface.size),
         **({"plinths": ready.plinths} if ready.plinths else {}),
-        "spacing": f"{design.spacing:g} m, {design.reason}: {len(design.placed.net.grid.lattice)} crossings",
+        "spacing": f"{design.spacing:g} m, {design.reason}: {len(design.placed.net.grid.lattice)} crossings"
+        + bare_told(design.placed.net),
         "angle": f"{design.placed.angle:g}°",
         "rods": f"{design.parts.choice.label} of {design.parts.choice.catalogue} (equation 1 allows {2e3 * design.allowed:.3g} mm)",
         **({"joints": "turn, as swivel couplers do"} if design.parts.swivels else {}),

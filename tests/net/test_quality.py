@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.net import quality
+from shellform.net import cover, quality
 from shellform.net.chebyshev import pull_net
 from shellform.net.grid import cells, lattice_grid
 from shellform.net.refusal import NoNet
@@ -31,14 +31,16 @@ def grid():
 
 
 def test_a_flat_net_on_a_plane_is_perfect(plane, grid):
+    state = at_rest(grid.flat)
+    covered = cover.cover(plane, grid, state)
     found = quality.measure(
-        plane,
         Locator(plane),
         grid,
-        at_rest(grid.flat),
+        state,
         np.zeros((len(grid.rod_ends), 2, 2)),
         np.zeros(grid.node_count),
-        0,
+        spent=0,
+        bare=covered.bare,
     )
     assert found.distance_max < 1e-15
     assert found.spacing_error_max < 1e-12
@@ -81,7 +83,7 @@ def test_a_net_that_lies_on_itself_is_refused(plane):
 def measured(plane, grid, places, *, curvature=None, pull=None):
     bent = np.zeros((len(grid.rod_ends), 2, 2)) if curvature is None else curvature
     pull = np.zeros(grid.node_count) if pull is None else pull
-    return quality.measure(plane, Locator(plane), grid, at_rest(places), bent, pull, 0)
+    return quality.measure(Locator(plane), grid, at_rest(places), bent, pull, spent=0, bare=0.0)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -152,7 +154,7 @@ def test_the_farthest_crossing_and_the_sharpest_one_tell_a_net_s_distance_and_sh
     place[grid.crossing_nodes[7], 2] += 0.05
     turned[grid.rods[-1].nodes] = [np.cos(0.2), 0.0, 0.0, -np.sin(0.2)]
     bent, pull = np.zeros((len(grid.rod_ends), 2, 2)), np.zeros(grid.node_count)
-    found = quality.measure(plane, Locator(plane), grid, State(place, turned), bent, pull, 5)
+    found = quality.measure(Locator(plane), grid, State(place, turned), bent, pull, spent=5, bare=0.0)
     assert found.distance_max == pytest.approx(0.05)
     assert found.distance_mean == pytest.approx(0.05 / len(grid.lattice))
     assert found.shear_angle_min == pytest.approx(0.5 * np.pi - 0.4)
@@ -185,19 +187,6 @@ def test_crossings_that_lie_nearer_or_farther_than_their_spacing_by_half_a_perce
     place = quality.crossing_points(grid, at_rest(grid.flat))[pair].mean(axis=0).round(3).tolist()
     assert f"crossings at {place} lie" in told
     assert "where up to 0.50 % is usual" in told
-
-
-def test_what_is_bare_is_sampled_a_quarter_of_the_spacing_apart(monkeypatch):
-    """Of a triangle of 2 m² in 144 parts those whose middle lies beyond 0.75 m along x: 28 that stand and 28
-    that hang; with half the spacing in 529 those beyond half as far."""
-    corners = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
-    surface = SimpleNamespace(vertices=corners, triangles=np.array([[0, 1, 2]]))
-    monkeypatch.setattr(
-        quality, "Tree", lambda _pieces: SimpleNamespace(nearest=lambda points: (None, None, points[:, 0]))
-    )
-    for scale, bare in ((1.0, 2.0 * 56 / 144), (0.5, 2.0 * 361 / 529)):
-        made = SimpleNamespace(rod_ends=np.array([[0, 1]]), scale=scale)
-        assert quality.uncovered(surface, made, at_rest(corners)) == pytest.approx(bare)
 
 
 def test_the_resultant_curvature_is_made_of_its_two_parts(net):

@@ -476,7 +476,7 @@ def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_b
         ((1.06, 18.0), (1.0, 17.0), ("adjusted on site",)),
         ((0.9, 26.0), (0.8, 20.0), ("adjusted on site",)),
         ((0.9, 18.0), (0.8, 17.0), ()),
-        ((1.06, 26.0), (1.01, 20.0), (over, "adjusted on site")),
+        ((1.06, 26.0), (1.01, 20.0), ("adjusted on site", over)),
         ((1.06, 26.0), (1.0, 20.5), ("adjusted on site", pulled)),
         ((1.06, 26.0), None, (over, pulled)),
     ):
@@ -484,7 +484,7 @@ def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_b
         record = verdict_of(made((own[0], 1.3), (own[1], 30.0), after))
         assert record.provided == said
         assert headline(record).startswith(
-            f"The polished design holds{', ' if said else ''}{' and '.join(said)}: all"
+            f"The polished design holds{', ' if said else ''}{', '.join(said)}: all"
         )
     assert then[cables].caution.endswith("20.5 N in the worst. For more than that take stronger cables")
     slack = {"none": load("none", cable_force_max=0.0)}

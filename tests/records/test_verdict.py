@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from shellform.cli.terminal import tell_designs, tell_verdict
+from shellform.net.cover import BarePatch
 from shellform.records.as_built import AsBuilt, Farthest
 from shellform.records.checks import checks
 from shellform.records.limited import Bounds
@@ -276,6 +277,55 @@ def test_a_design_whose_structures_snap_far_on_their_way_holds_and_asks_for_care
         *(f"  caution: {each}" for each in told.cautions),
     ]
     assert check.cells["polished"].holds is True
+
+
+@pytest.mark.parametrize(
+    ("cells", "share", "holds", "caution", "provided"),
+    [
+        (0.24, 0.001, True, False, False),
+        (0.26, 0.001, True, True, False),
+        (0.99, 0.01, True, True, False),
+        (1.0, 0.02, True, True, True),
+        (1.0, 0.021, False, True, True),
+    ],
+)
+def test_what_lies_beyond_the_rods_is_told_asks_for_care_and_fails_past_its_limit(
+    shell, designs, cells, share, holds, caution, provided
+):
+    area = cells * made.NET.spacing * made.NET.spacing_v
+    patch = BarePatch(area, (1.0, 2.0, 0.5), 0.07)
+    net = replace(made.NET, uncovered_area=area, uncovered_share=share, uncovered=(patch,))
+    found = checks(
+        every(shell, designs), designs, replace(summary(designs), net=net), replace(BOUNDS, uncovered=0.02)
+    )
+    record = verdict(found, "polished")
+    assert record.holds is holds
+    check = next(each for each in found if each.title == "Surface beyond the rods")
+    assert check.limit == "up to 2 % of it"
+    told = f"{area:.2g} m²"
+    assert check.cells["initial"].found == f"{100.0 * share:.2g} %, {told}"
+    care = (
+        f"Surface beyond the rods: {told} of the surface lie farther than 0.75 spacings from any rod: {told} at (1, 2, 0.5) m, "
+        "up to 0.07 m from any rod. Formwork needs props of its own there."
+    )
+    assert record.cautions == ((care,) if caution else ())
+    assert record.provided == ((f"with {told} beyond its rods",) if provided else ())
+    if provided and holds:
+        assert (
+            headline(record)
+            == f"The polished design holds, with {told} beyond its rods: all checks do, with 1 caution."
+        )
+    if not holds:
+        assert record.failed[0].endswith(
+            "Another net.angle or net.offset, or a smaller net.spacing, covers more."
+        )
+
+
+def test_a_net_that_covers_all_says_so_and_one_of_an_older_run_nothing(shell, designs):
+    for share, found in ((0.0, ["none"]), (None, [])):
+        run = replace(summary(designs), net=replace(made.NET, uncovered_share=share))
+        told = checks(every(shell, designs), designs, run, BOUNDS)
+        assert [each.cells["polished"].found for each in told if "beyond the rods" in each.title] == found
 
 
 def test_what_is_only_told_asks_for_no_care_in_the_verdict(shell, designs):

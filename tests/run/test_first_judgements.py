@@ -497,7 +497,8 @@ def test_a_surface_that_no_net_covers_is_refused_in_sentences(monkeypatch):
 def test_a_search_tells_the_crossings_of_the_net_that_it_proposes(monkeypatch):
     """Rods that run beside an edge are left out where the net is stood up: 257 crossings of 259."""
     pulled, stood = (
-        SimpleNamespace(grid=SimpleNamespace(lattice=range(count)), edges=()) for count in (259, 257)
+        SimpleNamespace(grid=SimpleNamespace(lattice=range(count)), edges=(), bare_cells=0.0)
+        for count in (259, 257)
     )
     said = nets_of(monkeypatch, FirstNets(Placed(pulled, 30.0, (0.0, 0.0)), ()), [(pulled, stood)])[1]
     assert said == ["net at 30° and 0.5 m: 257 crossings, rods bend to a radius of 257 m"]
@@ -508,7 +509,7 @@ def test_on_a_saddle_the_net_across_comes_first_unless_its_arches_push_against_e
     monkeypatch, edges, order
 ):
     pulled, stood = (
-        [SimpleNamespace(grid=SimpleNamespace(lattice=range(9)), edges=own) for _ in range(2)]
+        [SimpleNamespace(grid=SimpleNamespace(lattice=range(9)), edges=own, bare_cells=0.0) for _ in range(2)]
         for own in ((), edges)
     )
     best, across = (Placed(net, angle, (0.0, 0.0)) for net, angle in zip(pulled, (30.0, 75.0), strict=True))

@@ -8,15 +8,17 @@ import pytest
 
 from shellform.net.refusal import Stalled
 from shellform.run import first_net
-from shellform.run.first_net import Allowance, bends_to, larger, least_bent_net
+from shellform.run.first_net import Allowance, bare_told, bends_to, larger, least_bent_net
 from shellform.run.sizes import MOST_CROSSINGS, Placed
 
 SURFACE = SimpleNamespace(area=100.0)
 
 
-def net(curvature, cost=1.0, arching=1.0):
-    """A net whose rods are bent out of the surface by `arching` and -`arching`, 1/m."""
+def net(curvature, cost=1.0, arching=1.0, bare=0.0):
+    """A net whose rods are bent out of the surface by `arching` and -`arching`, 1/m, and leave so many cells
+    of it bare."""
     return SimpleNamespace(
+        bare_cells=bare,
         quality=SimpleNamespace(curvature_max=curvature), grid=None, target=None, cost=cost, edges=(),
         curvature=np.array([[arching, 9.0], [-arching, 0.0]]),
     )  # fmt: skip
@@ -62,6 +64,20 @@ def test_the_least_bent_net_is_taken_of_those_alike_the_cheapest_and_angles_near
     assert allowance.left == 5000 - 4 * 400
     assert said == []
     assert told[0] == "net at 45°, 0.5 m: rods bend to a radius of 1 m"
+
+
+def test_of_nets_alike_one_that_leaves_less_than_a_cell_bare_is_taken_before_a_cheaper_one(pulled):
+    bare = {"a45": net(1.0, 9.0, bare=0.9), "a0": net(1.04, 3.0, bare=1.0), "a23": net(1.2, 1.0)}
+    assert pulled(Allowance(5000), (45.0, 0.0, 23.0), **bare)[0].angle == 45.0
+    bare["a45"].bare_cells = 1.1
+    assert pulled(Allowance(5000), (45.0, 0.0, 23.0), **bare)[0].angle == 0.0, "the cheaper of two alike"
+
+
+def test_what_lies_beyond_the_rods_is_told_with_the_net_from_a_quarter_of_a_cell_on():
+    made = SimpleNamespace(bare_cells=0.25, quality=SimpleNamespace(uncovered_area=0.123))
+    assert bare_told(made) == ", 0.12 m² of the surface lie beyond them"
+    made.bare_cells = 0.24
+    assert bare_told(made) == ""
 
 
 @pytest.mark.parametrize(("arching", "told"), [(0.41, True), (0.39, False)])

@@ -12,22 +12,25 @@ from shellform.arrays import Reals
 from shellform.net.net import Net
 from shellform.output.pictures import render
 from shellform.output.pictures.maps import DEGREE, along_rods, worst_at_nodes
-from shellform.output.pictures.panel import Look, Panel
+from shellform.output.pictures.panel import Look, Panel, Skin
+from shellform.surface.shape.target import Surface
 from shellform.written import make_folder
 
 
-def draw_net(net: Net, folder: str | Path) -> list[Path]:
-    """Writes net-distance, net-curvature, net-skew and net-springs, each as .png; returns the files."""
+def draw_net(net: Net, folder: str | Path, surface: Surface | None = None) -> list[Path]:
+    """Writes net-distance, net-curvature, net-skew and net-springs, each as .png; returns the files. With the
+    `surface` what lies beyond the rods is seen."""
     target = make_folder(folder)
-    return [draw_map(net, name, target / f"net-{name}.png") for name in _MAPS]
+    return [draw_map(net, name, target / f"net-{name}.png", surface) for name in _MAPS]
 
 
-def draw_map(net: Net, name: str, path: Path) -> Path:
-    """Writes one of the maps "distance", "curvature", "skew" and "springs"; its colours end at the largest
-    value.
+def draw_map(net: Net, name: str, path: Path, surface: Surface | None = None) -> Path:
+    """Writes one of the maps "distance", "curvature", "skew" and "springs", on the `surface` if it is given;
+    its colours end at the largest value.
     """
     panel = panel_of(net, name)
-    render.picture(path, panel, Look(limit=limit_of(panel)))
+    skin = None if surface is None else Skin(surface.vertices, surface.triangles)
+    render.picture(path, panel, Look(limit=limit_of(panel), surface=skin))
     return path
 
 
