@@ -7,7 +7,7 @@ thinner concrete last (first_thinner.py). What stands up to `NEEDED` times its l
 gap that follows its rods, solved again, and forty structures are drawn and loaded (first_trial.py). Edge
 beams are bundles of rods, or stiffer steel tubes where these are stressed too much or the shell nearly
 stands (first_edges.py). What stands gets heavier edge beams, stiffer rods and thicker strands where they
-help (first_finish, first_steadier).
+help (first_finish, first_steadier), and thinner rods where its own break on every way up (first_raised).
 
 Nothing is random but what is drawn under a fixed seed: the same surface gives the same case.
 """
@@ -28,6 +28,7 @@ from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_edges import HEAVY, EdgeChoice, edge_choices
 from shellform.run.first_finish import came_to, nearer, straighter, too_far, with_room
 from shellform.run.first_net import ANGLES, Allowance, least_bent_net, net_told, with_gap
+from shellform.run.first_raised import raisable
 from shellform.run.first_steadier import steadier, strays, with_strays
 from shellform.run.first_thinner import with_thinner_concrete
 from shellform.run.first_trial import (
@@ -49,6 +50,7 @@ from shellform.run.next_trial import (
     narrowed,
     relieved,
     stiffer_rods,
+    thinner_rods,
 )
 from shellform.run.sizes import (
     BENT,
@@ -117,7 +119,7 @@ def finished_design(
     design: FirstDesign, surface: Surface, wish: DesignWish, say: Say, allowance: Allowance
 ) -> FirstDesign:
     """What stands for the surface and wish, on edge beams that don't sag too far, near enough to its shape,
-    with strands that leave a search room."""
+    with strands that leave a search room and rods that bear being raised."""
     search = _Search(surface, wish, say, allowance)
     search.told, search.reasons = list(design.told), {design.spacing: design.reason}
     found = straighter(design, surface, search.with_edges, allowance)
@@ -128,7 +130,9 @@ def finished_design(
     if strays(found, surface):
         found = steadier(found, surface, search.stiffer, search.other, allowance, search.say)
         found = replace(found, told=tuple(search.told))
-    return found
+    before = len(search.told)
+    found = raisable(found, surface, search.thinner, search.other, allowance, search.say)
+    return found if len(search.told) == before else replace(found, told=tuple(search.told))
 
 
 class _Search:
@@ -159,6 +163,12 @@ class _Search:
             for each in choices(design.placed.net, design.spacing, self.wish.rod, layers)
         ]
         return stiffer_rods(design.placed.net, possible, design.parts.choice, design.tried.stress, times)
+
+    def thinner(self, design: FirstDesign, share: float) -> RodChoice:
+        """Rods in as many layers that bending stresses to a `share` of what it does a design's, if any."""
+        own = design.parts.choice
+        possible = choices(design.placed.net, design.spacing, self.wish.rod, layers_of(own.section))
+        return thinner_rods(possible, own, share)
 
     def that_holds(self, *, finer: bool) -> FirstDesign:
         """The first that stands."""

@@ -23,6 +23,7 @@ from shellform.gridshell.loads import concrete, rods
 from shellform.gridshell.tolerances import default_tolerances, enlarged
 from shellform.net.net import Net
 from shellform.problem.paths import deviations
+from shellform.records.raising import WayUpRecord
 from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
 from shellform.run.first_edges import EdgeChoice
@@ -139,7 +140,8 @@ class FirstDesign:
     """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; the `parts`; `thickness`, m, of
     the concrete; what the perfect structure came to (`tried`); of `drawn` structures `standing`; the largest
     fibre distance, m, that equation (1) allows rods of that material (`allowed`); what was `told` on the
-    way; how far, m, structures as built stray (`strays`; None: not looked at)."""
+    way; how far, m, structures as built stray (`strays`; None: not looked at); and the `ways_up` (none: not
+    looked at)."""
 
     spacing: float
     reason: str
@@ -152,11 +154,12 @@ class FirstDesign:
     allowed: float
     told: tuple[str, ...]
     strays: float | None = None
+    ways_up: tuple[WayUpRecord, ...] = ()
 
 
 def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> Followed:
     """The design followed up to `NEEDED` times its load."""
-    shell, load = _shell(net, surface, parts, thickness)
+    shell, load = first_shell(net, surface, parts, thickness)
     design = shell.design(rest_ratio=parts.rest_ratio)
     assembly = assemble(shell.network(design))
     none = np.zeros((shell.node_count, 6))
@@ -195,7 +198,7 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
 def drawn_standing(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> int:
     """How many of up to `DRAWN` structures stand under the additional load, drawn few at a time until one of
     them falls: `DRAWN` where none does."""
-    shell, load = _shell(net, surface, parts, thickness)
+    shell, load = first_shell(net, surface, parts, thickness)
     nominal = perfect(shell, shell.design(rest_ratio=parts.rest_ratio), ADDITIONAL * load)
     workshop, tolerances = Workshop(nominal), enlarged(default_tolerances(shell), ENLARGED)
     standing = 0
@@ -212,13 +215,13 @@ def drawn_standing(net: Net, surface: Surface, parts: FirstParts, thickness: flo
 def straying(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> float:
     """How far any node of structures as built that stand lies from where that of the perfect one does, under
     the design load, m."""
-    shell, load = _shell(net, surface, parts, thickness)
+    shell, load = first_shell(net, surface, parts, thickness)
     nominal = perfect(shell, shell.design(rest_ratio=parts.rest_ratio), load)
     made = Workshop(nominal).load_numbers(default_tolerances(shell), seed=_SEED, numbers=range(LOOKED_AT))
     return max((each.far for each in made if each.stands), default=0.0)
 
 
-def _shell(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> tuple[Gridshell, Reals]:
+def first_shell(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> tuple[Gridshell, Reals]:
     """The gridshell and its load (n, 6), N; the joint's gap is the net's."""
     rope, section = parts.rope, parts.choice.section
     rod = Rod(section)

@@ -130,7 +130,7 @@ def _after(net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle
     fallen, least = _stiffest_fallen(tried), _least_broken(tried)
     if least is None or (found not in tried and found > fallen):
         return found
-    thinner = possible.index(thinner_rods(possible, possible[least], tried[least]))
+    thinner = possible.index(thinner_rods(possible, possible[least], to_bear(tried[least])))
     if failure.why is Why.STRENGTH and thinner > fallen and _may_stand(possible, tried, thinner):
         return thinner
     between = _between(possible, tried)
@@ -182,13 +182,9 @@ def _least_broken(tried: Mapping[int, Obstacle]) -> int | None:
     return min(broken, key=lambda each: tried[each].stress, default=None)
 
 
-def thinner_rods(possible: Sequence[RodChoice], choice: RodChoice, failure: Obstacle) -> RodChoice:
-    """Of the `possible` sections the stiffest that is so much less deep than the `choice`, for its material,
-    that bending stresses it no more than it may be; the `choice` itself where there is none."""
-    if choice not in possible:
-        return choice
-    share = AIMED * STRESSED / failure.stress
-    return possible[next_thinner(possible, possible.index(choice), share)]
+def to_bear(failure: Obstacle) -> float:
+    """Which share of the stress that broke rods they may have."""
+    return AIMED * STRESSED / failure.stress
 
 
 def stiffer_rods(
@@ -203,6 +199,15 @@ def stiffer_rods(
     at = rising.index(choice)
     found = next_choice(net, rising, at, stress, times, STRESSED)
     return rising[found] if found > at else None
+
+
+def thinner_rods(possible: Sequence[RodChoice], choice: RodChoice, share: float) -> RodChoice:
+    """Of the `possible` sections, by rising stiffness, the stiffest that is so much less deep than the
+    `choice`, for its material, that bending stresses it no more than a `share` as much; the `choice` itself
+    where there is none."""
+    if choice not in possible:
+        return choice
+    return possible[next_thinner(possible, possible.index(choice), share)]
 
 
 def bears_most(failures: Sequence[Obstacle], nearest: Obstacle) -> Obstacle:
@@ -270,7 +275,7 @@ def thinned(
         before, failure, rods, less_deep = failure, result, other, None
         if failure.breaks_unloaded(before, STRESSED):
             nearest, thickness = failure, before.thickness
-            less_deep = thinner_rods(possible, rods, failure)
+            less_deep = thinner_rods(possible, rods, to_bear(failure))
             if less_deep in seen or thickness < least:
                 break
     return nearest, None

@@ -8,23 +8,21 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from shellform.case.build_net import FAR, counted_from, distant_origin, size_text, surface_of
-from shellform.errors import InputError, NotConverged, how_many, printable
+from shellform.errors import InputError, NotConverged, printable
 from shellform.gridshell.catalogue import label
-from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import Edges, stretches_of
-from shellform.net.ground import Ground, ground_under
-from shellform.net.net import Stretch
+from shellform.net.ground import ground_under
 from shellform.quantities import number
 from shellform.records.progress import Event, Kind, Report, unheard
+from shellform.records.words import raising_words
 from shellform.run.first_design import finished_design, first_design
-from shellform.run.first_edges import TUBES
 from shellform.run.first_finish import far_told
 from shellform.run.first_look import surface_entry
 from shellform.run.first_net import Allowance, bare_told, bends_to, larger
@@ -40,9 +38,9 @@ from shellform.run.first_trial import (
 )
 from shellform.run.narrow_holes import narrow_holes
 from shellform.run.plinths import plinths_for
+from shellform.run.proposed_edges import edge_beams_table, edge_beams_told, edges_told, named
 from shellform.run.proposed_shape import built_deviation, optimise_table, stray_told
 from shellform.run.sizes import THICKNESS, DesignWish, RodChoice, usual_thickness
-from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
@@ -189,7 +187,7 @@ def _written(
     """The case for the surface in `file`, written, with what was `told` before at its head, and what it
     proposes; `steady`: on which its structures wouldn't stray too far as built, where they do."""
     surface = ready.surface
-    edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)), ground_under(surface))
+    edges = edges_told(stretches_of(surface, Edges(outer=wish.edges)), ground_under(surface))
     entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **ready.options}
     design = replace(design, told=(*told, *design.told))
     title = asked.file.stem + ("" if file == asked.file else ", nearest buildable surface")
@@ -208,8 +206,9 @@ def _written(
         "concrete": f"{1e3 * design.thickness:g} mm",
         "stands": f"up to {design.tried.factor:.2f} × its load or more; {design.standing} of {design.drawn} structures under 1.2 × its load with {_BUILT}",
         **({"shape": far} if far else {}),
+        **({"raising": raising_words(design.ways_up)} if design.ways_up else {}),
         "edges": edges,
-        **({"edge beams": _edge_beams_told(design)} if design.placed.net.edges else {}),
+        **({"edge beams": edge_beams_told(design)} if design.placed.net.edges else {}),
         "case": str(asked.output),
     }
 
@@ -247,7 +246,7 @@ elements = {ELEMENTS}         # beams a segment; what is asked of the design has
 
 [rod]
 catalogue = "{choice.catalogue}"
-section = "{_named(label(single(choice.section)))}"    # equation (1) allows {2e3 * design.allowed:.3g} mm where the net is curved most, to a radius of {bent:.3g} m; \
+section = "{named(label(single(choice.section)))}"    # equation (1) allows {2e3 * design.allowed:.3g} mm where the net is curved most, to a radius of {bent:.3g} m; \
 rods at {design.tried.stress:.0%} of their strength under the load followed
 {_layers(choice)}{_joint(parts)}
 [cable]
@@ -261,7 +260,7 @@ outer = "{wish.edges}"       # {_outer(wish)}auto: ground where the edge is low,
 openings = "auto"    # [[edges.stretch]] names walls and abutments by height, box or curve
 
 [edges.beam]
-{_edge_beams(design)}
+{edge_beams_table(design)}
 
 [part.concrete]      # on its true area, so that the load stays where the spacing changes
 kind = "concrete"
@@ -307,35 +306,6 @@ def _outer(wish: DesignWish) -> str:
     return "" if wish.edges == "auto" else "as asked; "
 
 
-def _edge_beams(design: FirstDesign) -> str:
-    """The entries of [edges.beam]."""
-    section, told = design.parts.edge.section, _edges_came_to(design)
-    if isinstance(section, Bundle):
-        return f"""\
-rods = {section.count}            # {told}in a bundle, as the rods are; or width and height, radius and wall, catalogue and section
-composite = {section.composite!r}      # how far they act together: 1 as if glued, 0 loose"""
-    return f"""\
-catalogue = "{TUBES}"
-section = "{_named(label(section))}"    # {told}rolled to the edge's curve; or rods in a bundle, width and height, radius and wall"""
-
-
-def _edge_beams_told(design: FirstDesign) -> str:
-    """What they are, and what they weigh."""
-    edge = design.parts.edge
-    return f"{edge.label}, {mass_per_length(edge.section):.3g} kg/m"
-
-
-def _edges_came_to(design: FirstDesign) -> str:
-    """What the initial design's edge beams came to: no cable lifts an edge, so that what it sags by stays in
-    the shape."""
-    if not design.placed.net.edges:
-        return ""
-    tried = design.tried
-    return (
-        f"stressed to {tried.edge:.0%} of their strength, up to {tried.sag_told} off under 1.2 × the load; "
-    )
-
-
 def _layers(choice: RodChoice) -> str:
     """The entries of rods in two layers."""
     if layers_of(choice.section) == 1:
@@ -357,11 +327,6 @@ stiffer ones bend the rods where the net's right angles are sheared
 """
 
 
-def _named(told: str) -> str:
-    """A section's label as it is typed."""
-    return told.replace("⌀", "").replace("×", "x").strip()
-
-
 def _check(output: Path) -> None:
     """Raises InputError where the case can't be written there."""
     if output.suffix.lower() != ".toml":
@@ -376,23 +341,6 @@ def _check(output: Path) -> None:
         raise InputError(
             "there is no such folder", where=str(output.parent), remedy="Make it, or choose another --output."
         )
-
-
-def _edges_told(stretches: Sequence[Stretch], ground: Ground) -> str:
-    """What was found, in a line: "2 stretches on the ground, 2 edge beams, 1 of them round an opening"."""
-    beams = [each for each in stretches if each.kind == "beam"]
-    standing, walls = len(stretches) - len(beams), all(each.kind in ("wall", "beam") for each in stretches)
-    rings = sum(each.opening for each in beams)
-    sloping = f", which {ground.told}" if ground.slopes and not walls else ""
-    told = f"{how_many(standing, 'stretch', 'stretches')} on {'walls' if walls else 'the ground'}{sloping}"
-    if not beams:
-        return told
-    lowest = min(float(ground.over(each.points).min()) for each in stretches)
-    highest = max(float(ground.over(each.points).max()) for each in beams) - lowest
-    over = "over it" if sloping else "above the lowest"
-    return f"{told}, {how_many(len(beams), 'edge beam', 'edge beams')} up to {highest:.3g} m {over}" + (
-        f", {rings} of them round openings" if rings else ""
-    )
 
 
 def _short(value: float) -> float:

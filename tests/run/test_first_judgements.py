@@ -233,7 +233,7 @@ def test_structures_are_drawn_under_the_additional_load_with_larger_errors_until
             return [SimpleNamespace(stands=number != falls) for number in numbers]
 
     shell = SimpleNamespace(design=lambda rest_ratio: rest_ratio)
-    monkeypatch.setattr(first_trial, "_shell", lambda *_: (shell, 10.0))
+    monkeypatch.setattr(first_trial, "first_shell", lambda *_: (shell, 10.0))
     monkeypatch.setattr(first_trial, "perfect", lambda shell, design, load: (design, load))
     monkeypatch.setattr(first_trial, "default_tolerances", lambda shell: "usual")
     monkeypatch.setattr(first_trial, "enlarged", lambda usual, times: (usual, times))
@@ -262,7 +262,7 @@ def test_rods_edge_beams_and_cables_are_judged_under_the_additional_load(monkeyp
         utilisation=lambda design, state: np.array([0.1, 0.4 * state]),
         cables=lambda design: SimpleNamespace(tension=lambda state: np.array([100.0 * state])),
     )
-    monkeypatch.setattr(first_trial, "_shell", lambda *_: (shell, 1.0))
+    monkeypatch.setattr(first_trial, "first_shell", lambda *_: (shell, 1.0))
     monkeypatch.setattr(first_trial, "assemble", lambda network: None)
     monkeypatch.setattr(first_trial, "find_equilibrium", lambda *_, **__: SimpleNamespace(state=0.0))
     monkeypatch.setattr(first_trial, "apply_load", loaded)
@@ -390,6 +390,7 @@ def test_what_lies_far_off_is_stiffened_before_its_strands_and_what_strays_after
         return design
 
     monkeypatch.setattr(first_design, "straighter", lambda design, *_: design)
+    monkeypatch.setattr(first_design, "raisable", lambda design, *_: done.append("raised") or design)
     monkeypatch.setattr(first_design, "with_strays", lambda design, surface: design)
     monkeypatch.setattr(first_design, "strays", lambda *_: stray)
     monkeypatch.setattr(first_design, "steadier", steadier)
@@ -397,7 +398,7 @@ def test_what_lies_far_off_is_stiffened_before_its_strands_and_what_strays_after
     monkeypatch.setattr(first_design, "nearer", nearer)
     monkeypatch.setattr(first_design, "with_room", lambda design, *_: done.append("with room") or design)
     told = first_design.finished_design(found, None, DesignWish(), lambda text: None, Allowance()).told
-    assert done == finished
+    assert done == [*finished, "raised"]
     assert told == (("before", "what was tried since") if far or stray else ("before",))
 
 

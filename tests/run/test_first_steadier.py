@@ -120,7 +120,7 @@ def test_how_far_structures_stray_is_what_design_draws_of_the_initial_one(monkey
             return [SimpleNamespace(stands=n != 5, far=far.get(n, 0.1)) for n in numbers]
 
     shell = SimpleNamespace(design=lambda rest_ratio: rest_ratio)
-    monkeypatch.setattr(first_trial, "_shell", lambda *_: (shell, 10.0))
+    monkeypatch.setattr(first_trial, "first_shell", lambda *_: (shell, 10.0))
     monkeypatch.setattr(first_trial, "perfect", lambda shell, design, load: (design, load))
     monkeypatch.setattr(first_trial, "default_tolerances", lambda shell: "usual")
     monkeypatch.setattr(first_trial, "Workshop", Bench)

@@ -47,13 +47,17 @@ def test_after_a_shell_that_falls_comes_a_section_stiffer_by_more_than_what_it_l
 def test_where_only_deeper_sections_are_left_rods_give_way_to_less_deep_ones_for_the_stress_that_they_may_have():
     """Of 1.4 times their strength 0.92 of 0.95 are left by rods of 0.62 of the depth, of 1.05 by such of
     0.83."""
-    assert next_trial.thinner_rods(SOME, THICK, failed(Why.STRENGTH, stress=1.4)) is MIDDLE
-    assert next_trial.thinner_rods(SOME, MIDDLE, failed(Why.STRENGTH, stress=1.05)) is THIN
-    assert next_trial.thinner_rods(SOME, MIDDLE, failed(Why.STRENGTH, stress=1.15)) is MIDDLE, (
-        "none is so thin"
+    assert (
+        next_trial.thinner_rods(SOME, THICK, next_trial.to_bear(failed(Why.STRENGTH, stress=1.4))) is MIDDLE
     )
+    assert (
+        next_trial.thinner_rods(SOME, MIDDLE, next_trial.to_bear(failed(Why.STRENGTH, stress=1.05))) is THIN
+    )
+    assert (
+        next_trial.thinner_rods(SOME, MIDDLE, next_trial.to_bear(failed(Why.STRENGTH, stress=1.15))) is MIDDLE
+    ), "none is so thin"
     other = RodChoice("another", THICK.section)
-    assert next_trial.thinner_rods(SOME, other, failed(Why.STRENGTH, stress=1.4)) is other
+    assert next_trial.thinner_rods(SOME, other, next_trial.to_bear(failed(Why.STRENGTH, stress=1.4))) is other
 
 
 @pytest.mark.parametrize(("found", "then"), [(2, THICK), (1, None)])

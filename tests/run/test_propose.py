@@ -27,7 +27,8 @@ from shellform.run.first_edges import edge_choices
 from shellform.run.first_net import Allowance
 from shellform.run.first_refusal import Refused, WayOut
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts, Followed
-from shellform.run.propose import _edge_beams, _edge_beams_told, propose_case
+from shellform.run.propose import propose_case
+from shellform.run.proposed_edges import edge_beams_table, edge_beams_told
 from shellform.run.proposed_shape import built_deviation, optimise_table, stray_told
 from shellform.run.sizes import (
     LEAST_PRESTRAIN,
@@ -436,7 +437,7 @@ def test_a_proposed_case_tells_how_far_its_edge_beams_are_off_where_it_has_any(l
     tried = Followed(NEEDED, 0.5, 0.31, 0.0873, 0.0873, 0.5, np.zeros(3), np.zeros(3))
     for edge, key in zip(edge_choices(rods)[:2], ("rods", "section"), strict=True):
         parts = FirstParts(rods, edge, 0.996, rope_for(1.0), swivels=False)
-        entry = _edge_beams(
+        entry = edge_beams_table(
             SimpleNamespace(
                 parts=parts, tried=tried, placed=SimpleNamespace(net=SimpleNamespace(edges=lines))
             )
@@ -449,7 +450,7 @@ def test_what_edge_beams_are_is_told_with_what_they_weigh():
     """Nineteen rods of 32 mm and 2,000 kg/m³; a tube of 7,850 kg/m³."""
     rods = wished("gfrp_rods/32 mm")[0]
     bundle, tube = (
-        _edge_beams_told(SimpleNamespace(parts=SimpleNamespace(edge=edge))) for edge in edge_choices(rods)[:2]
+        edge_beams_told(SimpleNamespace(parts=SimpleNamespace(edge=edge))) for edge in edge_choices(rods)[:2]
     )
     assert bundle == f"19 rods, {19 * np.pi * 0.016**2 * 2000:.3g} kg/m"
     assert re.fullmatch(r"⌀ [\d.]+ × [\d.]+ mm, [\d.]+ kg/m", tube)
