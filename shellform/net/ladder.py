@@ -106,15 +106,16 @@ def climbed_net(
             if not near:
                 refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
-            attempts.append(Attempt(rung.change, turned, shifted, error.reason))
+            taken = error.iterations if isinstance(error, Stalled) else error.factorisations
+            attempts.append(Attempt(rung.change, turned, shifted, error.reason, taken))
             progress(attempts[-1].sentence())
             reasons.add(error.reason)
             first = first or error
-            spent += error.iterations if isinstance(error, Stalled) else error.factorisations
+            spent += taken
             if spent > most:
                 break
             continue
-        given = Attempt(rung.change, turned, shifted, None)
+        given = Attempt(rung.change, turned, shifted, None, net.quality.factorisations)
         if not attempts:
             return net, given
         notes = (*net.notes, *(NetNote(NoteKind.ATTEMPT, each.sentence()) for each in (*attempts, given)))

@@ -65,13 +65,14 @@ class Change(Enum):
 
 @dataclass(frozen=True)
 class Attempt:
-    """One attempt at a net: what it changed, its `angle`, rad, and `offset`, spacings, and why it failed;
-    None: it gave the net."""
+    """One attempt at a net: what it changed, its `angle`, rad, and `offset`, spacings, why it failed (None:
+    it gave the net), and the `factorisations` of its pull."""
 
     change: Change
     angle: float
     offset: tuple[float, float]
     reason: Reason | None
+    factorisations: int = 0
 
     def sentence(self) -> str:
         """In words, for people."""

@@ -165,11 +165,10 @@ def load_net(path: Path) -> Net:
 
 def _row(attempt: Attempt) -> list[Any]:
     reason = attempt.reason.name if attempt.reason else None
-    return [attempt.change.name, attempt.angle, list(attempt.offset), reason]
+    return [attempt.change.name, attempt.angle, list(attempt.offset), reason, attempt.factorisations]
 
 
 def _attempt(row: list[Any]) -> Attempt:
-    change, angle, offset, reason = row
-    return Attempt(
-        Change[change], float(angle), (float(offset[0]), float(offset[1])), Reason[reason] if reason else None
-    )
+    change, angle, offset, reason, *taken = row  # what pulls took isn't there in nets of before version 0.5
+    place = (float(offset[0]), float(offset[1]))
+    return Attempt(Change[change], float(angle), place, Reason[reason] if reason else None, *map(int, taken))

@@ -273,7 +273,7 @@ class Loading(Branch):
         # target.
         for near in (begin, moved(self.nominal.start, self.errors.supports)):
             try:
-                relaxed = find_equilibrium(self.assembly, near, none, limit=_RELAXATIONS)
+                relaxed = find_equilibrium(self.assembly, near, none, limit=_RELAXATIONS, symmetric=False)
             except NotConverged as error:
                 self.spent += error.iterations
                 continue

@@ -26,7 +26,7 @@ from shellform.gridshell.loads import CONCRETE, pressure, refuse_bulk
 from shellform.net.edges import Edges, stand
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_edges import HEAVY, EdgeChoice, edge_choices
-from shellform.run.first_finish import came_to, nearer, straighter, too_far, with_room
+from shellform.run.first_finish import came_to, made_of, nearer, straighter, too_far, with_room
 from shellform.run.first_net import ANGLES, Allowance, least_bent_net, net_told, with_gap
 from shellform.run.first_raised import raisable
 from shellform.run.first_steadier import steadier, strays, with_strays
@@ -312,14 +312,16 @@ class _Search:
         """The design with these rods and this load, and the lightest edge beams with which it stands. Single
         rods of which drawn structures fall, or that break, or whose cables are pulled too much, give way to
         two layers, which cost no more and spare more than heavier edge beams. Only where concrete is thinned
-        do edges that sag give way to heavier ones: before that, other rods do better."""
+        do edges that sag give way to heavier ones, but not of structures that fall: before that, other rods
+        do better, and for these still less concrete."""
         spare, thinned = more_come(choice, self.layers), thickness < self._thickness
         far = may_sag(self.surface, thickness) if thinned else math.inf
+        leaves = (Why.SCATTER, Why.STRENGTH, Why.CABLES) if spare else (Why.SCATTER,) if thinned else ()
         for edge in edge_choices(choice)[self.lightest : self.lightest + HEAVY]:
             result = self.with_edges(placed, choice, edge, spacing, thickness)
-            if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result, far)):
+            if isinstance(result, FirstDesign) or not placed.net.edges:
                 break
-            if spare and result.why in (Why.SCATTER, Why.STRENGTH, Why.CABLES):
+            if result.why in leaves or not edges_may_help(result, far):
                 break
         return result
 
@@ -339,17 +341,15 @@ class _Search:
     def _with_parts(
         self, placed: Placed, parts: FirstParts, spacing: float, thickness: float, *, climbs: bool = True
     ) -> FirstDesign | Obstacle:
-        """The design, where it stands with the gap that follows its rods too, and the net that is pulled with
-        that bends them no more than they bear; one that can't be pulled `climbs` the ladder, or doesn't."""
+        """The design, where it stands with the gap that follows its rods too, and the net pulled with that
+        bends them no more than they bear; one that can't be pulled `climbs` the ladder, or doesn't."""
         parts, tried, failure = self._solved(placed, parts, spacing, thickness)
-        choice = parts.choice
-        what = f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete"
-        if placed.net.edges:
-            what += f", edge beams of {parts.edge.label}"
-        gap = parts.joint.gap
+        choice, gap, what = parts.choice, parts.joint.gap, made_of(placed, parts, thickness)
         if failure is None and not math.isclose(placed.net.grid.gap, gap, rel_tol=1e-9):
             try:
-                placed = with_gap(self.surface, placed, spacing, gap, self.edges, self._say, climbs=climbs)
+                placed = with_gap(
+                    self.surface, placed, spacing, gap, self.edges, self._say, self.allowance, climbs=climbs
+                )
             except (NoNet, Stalled) as error:
                 return self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
             if (bent := too_curved(placed, [choice], spacing, thickness)).why is Why.CURVATURE:
@@ -358,25 +358,25 @@ class _Search:
         self.say(f"{what}: {came_to(placed, tried)}")
         if failure is not None:
             return self._keep(failure)
-        self.allowance.spend(len(placed.net.grid.lattice), times=2)
-        standing = drawn_standing(placed.net, self.surface, parts, thickness)
-        fall = "" if standing == DRAWN else ", the next falls"
-        self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the additional load{fall}")
-        if standing < DRAWN:
-            why, where, stress = Why.SCATTER, tried.where, tried.stress
-            return self._keep(Obstacle(why, spacing, thickness, tried.factor, choice, placed, where, stress))
+        drawn = drawn_standing(placed.net, self.surface, parts, thickness)
+        self.allowance.spend_on(placed.net, drawn.factorisations)
+        self.say(f"{what}: {drawn.told}")
+        if drawn.falls:
+            return self._keep(Obstacle(
+                Why.SCATTER, spacing, thickness, tried.factor, choice, placed, tried.where, tried.stress,
+                stood=drawn.standing / DRAWN,
+            ))  # fmt: skip
         material = choice.section.material
         allowed = placed.net.max_radius(young=material.young, strength=material.strength)
         return FirstDesign(
             spacing=spacing, reason=self.reasons[spacing], placed=placed, parts=parts, thickness=thickness,
-            tried=tried, standing=standing, drawn=DRAWN, allowed=allowed, told=tuple(self.told),
+            tried=tried, standing=drawn.standing, drawn=DRAWN, allowed=allowed, told=tuple(self.told),
         )  # fmt: skip
 
     def _solved(
         self, placed: Placed, parts: FirstParts, spacing: float, thickness: float
     ) -> tuple[FirstParts, Followed, Obstacle | None]:
-        """The parts with cables below their limit, what the design came to, and what it fails by, if it
-        does."""
+        """The parts with cables below their limit, what the design came to, and what it fails by, if any."""
         parts, tried = relieved(parts, lambda each: self._followed(placed, each, thickness))
         why = fails_by(tried)
         if why is None:

@@ -165,15 +165,22 @@ def with_room(design: FirstDesign, surface: Surface, say: Say) -> FirstDesign:
         return design
     net, parts, thickness = design.placed.net, replace(design.parts, rope=rope), design.thickness
     tried = followed(net, surface, parts, thickness)
-    standing = 0 if fails_by(tried) is not None else drawn_standing(net, surface, parts, thickness)
+    drawn = None if fails_by(tried) is not None else drawn_standing(net, surface, parts, thickness)
     what = f"strands of {1e3 * rope.diameter:g} mm instead of {1e3 * design.parts.rope.diameter:g}, for the search"
-    if standing < DRAWN:
+    if drawn is None or drawn.falls:
         told = f"{what}: {came_to(design.placed, tried)}; not all drawn structures stand, and they are left"
         say(told)
         return replace(design, told=(*design.told, told))
-    told = f"{what}: {came_to(design.placed, tried)}; {standing} of {DRAWN} drawn structures stand"
+    told = f"{what}: {came_to(design.placed, tried)}; {drawn.standing} of {DRAWN} drawn structures stand"
     say(told)
     return replace(design, parts=parts, tried=tried, told=(*design.told, told))
+
+
+def made_of(placed: Placed, parts: FirstParts, thickness: float) -> str:
+    """What a design is made of, in words, with so much concrete, m."""
+    choice = parts.choice
+    edges = f", edge beams of {parts.edge.label}" if placed.net.edges else ""
+    return f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete{edges}"
 
 
 def came_to(placed: Placed, tried: Followed) -> str:

@@ -40,9 +40,10 @@ _ARCHED = 2.0
 _PULL, _BRIEF = 110, 70  # factorisations of one pull
 _PULLS, _USUAL_CROSSINGS = 450, 300  # factorisations of failed pulls, for so many crossings
 _LARGEST = 20.0  # times the usual crossings: hours of a processor before a design must have been found
-WORK = 37_500  # crossings pulled and solved, ways out included: about one and a half minutes of an idle processor
-_CLIMBED = 4  # times the work of a pull that ends, a ladder climbed with success
+# crossings pulled and solved, ways out included: two to three minutes of a processor, two at the most on two
+WORK = 45_000
 _A_PULL, _AT_ONCE = 40, 5  # factorisations that count as one pull; at the least, where it ends before any
+_A_TRIAL = 100  # factorisations of designs on the trimmed net that do
 Say = Callable[[str], None]
 
 
@@ -98,6 +99,10 @@ class Allowance:
         self.left -= times * round(crossings)
         if self.whole is not None:
             self.whole.spend(crossings, times)
+
+    def spend_on(self, net: Net, factorisations: int) -> None:
+        """Takes what so many factorisations of designs on a net cost."""
+        self.spend(len(net.grid.lattice) * factorisations / _A_TRIAL)
 
 
 def larger(surface: Surface, spacing: float | None) -> float:
@@ -193,7 +198,7 @@ def least_bent_net(
     except (NoNet, Stalled) as error:
         allowance.spend(crossings * _share_of_pull(_taken(error) - _taken(failed)))
         raise
-    allowance.spend(_CLIMBED * crossings)
+    allowance.spend(crossings * _climbed(net, first=False))
     return FirstNets(Placed(net, math.degrees(given.angle), given.offset), ())
 
 
@@ -204,20 +209,27 @@ def with_gap(
     gap: float,
     edges: Edges,
     tell: Say,
+    allowance: Allowance,
     *,
     climbs: bool,
 ) -> Placed:
     """The net pulled anew with another gap, its edges standing on what `edges` say; where that fails it
-    `climbs` the ladder, or doesn't. Raises NoNet or Stalled."""
-    net, given = climbed_net(
-        surface,
-        NetSettings(spacing=spacing, gap=gap, elements=ELEMENTS),
-        angle=math.radians(placed.angle),
-        offset=placed.offset,
-        most=_worth(surface, spacing) if climbs else 0,
-        near=False,
-        progress=tell,
-    )
+    `climbs` the ladder, or doesn't. The `allowance` is spent. Raises NoNet or Stalled."""
+    crossings = surface.area / spacing**2
+    try:
+        net, given = climbed_net(
+            surface,
+            NetSettings(spacing=spacing, gap=gap, elements=ELEMENTS),
+            angle=math.radians(placed.angle),
+            offset=placed.offset,
+            most=_worth(surface, spacing) if climbs else 0,
+            near=False,
+            progress=tell,
+        )
+    except (NoNet, Stalled) as error:
+        allowance.spend(crossings * _share_of_pull(_taken(error)))
+        raise
+    allowance.spend(crossings * _climbed(net, first=True))
     return Placed(stand(net, surface, edges), math.degrees(given.angle), given.offset)
 
 
@@ -264,6 +276,13 @@ def _worth(surface: Surface, spacing: float) -> int:
 def _share_of_pull(factorisations: int) -> float:
     """What pulls that failed cost, by the factorisations that they took, in pulls that end with a net."""
     return max(factorisations, _AT_ONCE) / _A_PULL
+
+
+def _climbed(net: Net, *, first: bool) -> float:
+    """What the attempts at a net cost that failed, the `first` too or not, and then the one that gave it, in
+    pulls that end with a net."""
+    failed = net.attempts[:-1] if first else net.attempts[1:-1]
+    return 1.0 + sum(_share_of_pull(each.factorisations) for each in failed)
 
 
 def _taken(error: NoNet | Stalled) -> int:

@@ -195,21 +195,42 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
     )
 
 
-def drawn_standing(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> int:
-    """How many of up to `DRAWN` structures stand under the additional load, drawn few at a time until one of
-    them falls: `DRAWN` where none does."""
+@dataclass(frozen=True)
+class FirstSample:
+    """Of structures drawn until one of them fell so many were `standing`, `DRAWN` where none did; and the
+    `factorisations` that they took: ten each where they bear their load with ease, hundreds where they
+    hardly do."""
+
+    standing: int
+    factorisations: int
+
+    @property
+    def falls(self) -> bool:
+        """Whether one of them did."""
+        return self.standing < DRAWN
+
+    @property
+    def told(self) -> str:
+        """In words."""
+        fall = ", the next falls" if self.falls else ""
+        return f"{self.standing} of {DRAWN} drawn structures stand under the additional load{fall}"
+
+
+def drawn_standing(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> FirstSample:
+    """How many of up to `DRAWN` structures stand under the additional load, drawn few at a time."""
     shell, load = first_shell(net, surface, parts, thickness)
     nominal = perfect(shell, shell.design(rest_ratio=parts.rest_ratio), ADDITIONAL * load)
     workshop, tolerances = Workshop(nominal), enlarged(default_tolerances(shell), ENLARGED)
-    standing = 0
+    standing, factorisations = 0, 0
     for first in range(0, DRAWN, _TOGETHER):
         made = workshop.load_numbers(
             tolerances, seed=SEED, numbers=range(first, min(first + _TOGETHER, DRAWN))
         )
         standing += sum(each.stands for each in made)
+        factorisations += sum(each.factorisations for each in made)
         if not all(each.stands for each in made):
             break
-    return standing
+    return FirstSample(standing, factorisations)
 
 
 def straying(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> float:

@@ -111,7 +111,8 @@ class Why(Enum):
 class Obstacle(Record):
     """How an attempt failed: `why`, at which `spacing` and `thickness`, m, up to which `factor` of its load
     it stood, with which `choice` of rods on which net (`placed`), `where` (3,), m, the rods' `stress` over
-    their strength and how far edge beams `sag`, m, under the additional load, or the net's own `error`."""
+    their strength and how far edge beams `sag`, m, under the additional load, which share of drawn structures
+    `stood` until one fell, or the net's own `error`."""
 
     why: Why
     spacing: float
@@ -122,6 +123,7 @@ class Obstacle(Record):
     where: Reals | None = None
     stress: float = 0.0
     sag: float = 0.0
+    stood: float = 0.0
     error: NoNet | Stalled | None = None
 
     def near(self, needed: float) -> tuple[float, float]:

@@ -48,7 +48,7 @@ def test_where_the_first_attempt_succeeds_nothing_is_changed():
     surface, settings = bowl(), NetSettings(spacing=0.25, gap=0.005, elements=2)
     plain = sf.pull_net(surface, spacing=0.25, gap=0.005, elements=2, angle=0.3)
     net, given = climbed_net(surface, settings, angle=0.3)
-    assert given == Attempt(Change.NOTHING, 0.3, (0.0, 0.0), None)
+    assert given == Attempt(Change.NOTHING, 0.3, (0.0, 0.0), None, net.quality.factorisations)
     assert net.attempts == ()
     assert net.notes == plain.notes
     assert (net.target.positions == plain.target.positions).all()

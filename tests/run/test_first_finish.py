@@ -7,7 +7,7 @@ import pytest
 from shellform.run import first_finish
 from shellform.run.first_edges import edge_choices
 from shellform.run.first_finish import came_to, far_told, nearer, straighter, too_far, with_room
-from shellform.run.first_trial import DRAWN, FirstDesign, FirstParts, Followed
+from shellform.run.first_trial import DRAWN, FirstDesign, FirstParts, FirstSample, Followed
 from shellform.run.sizes import Placed, Rope, rope_for, thicker, wished
 from shellform.run.unbuildable import Obstacle, Why
 
@@ -188,7 +188,7 @@ def test_a_shell_without_edge_beams_gets_stiffer_rods(monkeypatch):
 def test_a_design_gets_thicker_strands_where_it_stands_with_them_too(monkeypatch, factor, standing, kept):
     tried = Followed(factor, 0.4, 0.2, 0.034, 0.034, 0.5, np.zeros(3), np.zeros(3))
     monkeypatch.setattr(first_finish, "followed", lambda net, surface, parts, thickness: tried)
-    monkeypatch.setattr(first_finish, "drawn_standing", lambda net, surface, parts, thickness: standing)
+    monkeypatch.setattr(first_finish, "drawn_standing", lambda *_: FirstSample(standing, 440))
     said, before = [], design(0.05)
     found = with_room(before, None, said.append)
     assert found.told == ("before", *said)

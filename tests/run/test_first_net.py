@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shellform.net.refusal import Stalled
+from shellform.net.refusal import Attempt, Change, Reason, Stalled
 from shellform.run import first_net
 from shellform.run.first_net import Allowance, bare_told, bends_to, larger, least_bent_net
 from shellform.run.sizes import MOST_CROSSINGS, Placed
@@ -157,6 +157,9 @@ def test_where_no_angle_gives_a_net_the_ladder_is_climbed_from_the_first_with_th
     """Of 450 · 300 / 400 = 338 factorisations two pulls of 60 are spent, of which the first counts for the
     ladder."""
     climbed, asked = net(1.0), []
+    climbed.attempts = [
+        Attempt(Change.NOTHING, 0.0, (0.0, 0.0), Reason.STALLED, took) for took in (60, 80, 20)
+    ]
 
     def climb(surface, settings, *, angle, most, failed, near, progress):
         asked.append((settings.spacing, math.degrees(angle), most, near))
@@ -171,25 +174,49 @@ def test_where_no_angle_gives_a_net_the_ladder_is_climbed_from_the_first_with_th
     placed, near, *_ = pulled(allowance, (45.0, 0.0))
     assert (placed.net, placed.angle, placed.offset, near) == (climbed, pytest.approx(40.0), (0.25, 0.0), [])
     assert asked == [(0.5, pytest.approx(45.0), 338 - 120 + 60, False)]
-    assert allowance.left == 50_000 - 2 * 600 - 1600
+    assert allowance.left == 50_000 - 2 * 600 - 400 - 800, (
+        "what gave the net counts as one pull, the first has been"
+    )
 
 
 @pytest.mark.parametrize(("climbs", "worth"), [(True, 338), (False, 0)])
 def test_a_net_is_pulled_anew_with_another_gap_and_stands_on_its_edges(monkeypatch, climbs, worth):
     """Where no factorisation that fails is worth anything, the ladder ends with its first rung."""
-    asked = []
+    asked, allowance = [], Allowance(5000)
+    taken = [Attempt(Change.NOTHING, 0.0, (0.0, 0.0), Reason.STALLED, took) for took in (80, 20)]
+    made = SimpleNamespace(attempts=taken if climbs else [])
 
     def climb(surface, settings, *, angle, offset, most, near, progress):
         asked.append((settings.gap, round(math.degrees(angle), 9), offset, most, near))
-        return "net", SimpleNamespace(angle=math.radians(22.5), offset=(0.5, 0.0))
+        return made, SimpleNamespace(angle=math.radians(22.5), offset=(0.5, 0.0))
 
     monkeypatch.setattr(first_net, "climbed_net", climb)
     monkeypatch.setattr(first_net, "stand", lambda own, surface, edges: (own, edges))
     placed = first_net.with_gap(
-        SURFACE, Placed(None, 30.0, (0.5, 0.5)), 0.5, 0.07, "edges", print, climbs=climbs
+        SURFACE, Placed(None, 30.0, (0.5, 0.5)), 0.5, 0.07, "edges", print, allowance, climbs=climbs
     )
     assert asked == [(0.07, 30.0, (0.5, 0.5), worth, False)]
-    assert (placed.net, placed.angle, placed.offset) == (("net", "edges"), pytest.approx(22.5), (0.5, 0.0))
+    assert (placed.net, placed.angle, placed.offset) == ((made, "edges"), pytest.approx(22.5), (0.5, 0.0))
+    assert allowance.left == 5000 - 400 - (800 if climbs else 0)
+
+
+def test_what_fails_to_be_pulled_anew_is_spent_too(monkeypatch):
+    def climb(*_, **__):
+        raise Stalled("stalls", residual=0.1, iterations=60)
+
+    monkeypatch.setattr(first_net, "climbed_net", climb)
+    allowance = Allowance(5000)
+    with pytest.raises(Stalled):
+        first_net.with_gap(
+            SURFACE, Placed(None, 30.0, (0.5, 0.5)), 0.5, 0.07, "edges", print, allowance, climbs=True
+        )
+    assert allowance.left == 5000 - 600
+
+
+def test_what_structures_drawn_cost_is_spent_by_their_factorisations():
+    allowance = Allowance(5000)
+    allowance.spend_on(SimpleNamespace(grid=SimpleNamespace(lattice=range(250))), 440)
+    assert allowance.left == 5000 - 1100
 
 
 @pytest.mark.parametrize(

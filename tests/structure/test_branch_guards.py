@@ -15,6 +15,7 @@ from shellform.structure.solve.equilibrium import (
     Equilibrium,
     _minimum,
     _Relaxation,
+    find_equilibrium,
     newton,
     stability,
 )
@@ -183,3 +184,17 @@ def test_the_toggle_s_branch_ends_at_its_limit_load(toggle):
     above = apply_load(assembly, start, 0.0 * load, 4.0 * (ends.share + 0.01) * load)
     assert below.on_branch
     assert not above.on_branch
+
+
+def test_only_a_way_that_may_be_symmetric_is_looked_at_for_it(toggle, monkeypatch):
+    """Pushed through, its tangent is indefinite on the way."""
+    assembly, start, load = toggle
+    found = []
+    for symmetric in (True, False):
+        asked = []
+        monkeypatch.setattr(
+            _Relaxation, "_saddle", lambda self, *_, asked=asked: asked.append(self.symmetric)
+        )
+        found.append(find_equilibrium(assembly, start, 3.0 * load, symmetric=symmetric))
+        assert set(asked) == {symmetric}
+    assert (found[0].state.positions == found[1].state.positions).all()

@@ -114,10 +114,10 @@ def test_a_load_that_rounding_hides_is_relaxed_with_twice_the_digits_where_there
     monkeypatch.setattr(equilibrium, "_relaxed", relaxed)
     monkeypatch.setattr(equilibrium, "with_twice_the_digits", lambda _: precise)
     there, precise = at_rest(np.ones((1, 3))), "precise"
-    options = {"tolerance": 1e-5, "limit": 7, "reach": 2.0, "on_branch": True}
+    options = {"tolerance": 1e-5, "limit": 7, "reach": 2.0, "on_branch": True, "symmetric": False}
     assert find_equilibrium("plain", start, "load", **options) == "found"
     assert [each[:2] for each in asked] == [("plain", False), ("precise", True)]
-    assert asked[0][2] == asked[1][2] == ("load", 1e-5, 7, 2.0, True, None)
+    assert asked[0][2] == asked[1][2] == ("load", 1e-5, 7, 2.0, True, False, None)
     precise = None
     with pytest.raises(Drowned):
         find_equilibrium("plain", start, "load")
@@ -128,7 +128,7 @@ def test_a_load_that_rounding_hides_is_relaxed_with_twice_the_digits_where_there
 
 def test_a_relaxation_ends_at_its_limit_with_what_it_has_come_to(monkeypatch):
     class Walk:
-        factorisations, residual, state, now = 0, 0.25, "here", SimpleNamespace(energy=1.0)
+        factorisations, residual, state, now, symmetric = 0, 0.25, "here", SimpleNamespace(energy=1.0), True
 
         def __init__(self, *_):
             pass

@@ -96,22 +96,25 @@ def find_equilibrium(
     limit: int = LIMIT,
     reach: float = np.inf,
     on_branch: bool = False,
+    symmetric: bool = True,
     progress: Relaxing | None = None,
 ) -> Equilibrium:
     """The equilibrium that implicit dynamic relaxation reaches from `start` under the dead `load` (n, 6), N
     and N·m.
 
     Held degrees of freedom stay where `start` has them. `limit` bounds the factorisations;
-    `progress(factorisations, residual)` is called at every step. Raises NotConverged with the last state,
-    LostBranch where `on_branch` is set and definiteness is lost.
+    `progress(factorisations, residual)` is called at every step. `symmetric`: whether the way there may be
+    exactly so, for which small models are looked at; that of a structure with errors isn't. Raises
+    NotConverged with the last state, LostBranch where `on_branch` is set and definiteness is lost.
     """
     try:
-        return _relaxed(assembly, start, load, tolerance, limit, reach, on_branch, progress)
+        return _relaxed(assembly, start, load, tolerance, limit, reach, on_branch, symmetric, progress)
     except Drowned as error:
         precise = with_twice_the_digits(assembly)
         if precise is None or not isinstance(error.state, State):
             raise
-        return _relaxed(precise, extended(error.state), load, tolerance, limit, reach, on_branch, progress)
+        begin = extended(error.state)
+        return _relaxed(precise, begin, load, tolerance, limit, reach, on_branch, symmetric, progress)
 
 
 def _relaxed(
@@ -122,10 +125,12 @@ def _relaxed(
     limit: int,
     reach: float,
     on_branch: bool,
+    symmetric: bool,
     progress: Relaxing | None,
 ) -> Equilibrium:
     """The relaxation with the digits that the assembly has. Raises Drowned where they aren't enough."""
     walk = _Relaxation(assembly, start, load, reach, tolerance)
+    walk.symmetric &= symmetric
     if walk.drowns():
         raise drowned(assembly, start, walk.residual, 0)
     while not walk.balanced():
@@ -213,6 +218,7 @@ class _Relaxation:
     """The moving state of one relaxation."""
 
     def __init__(self, assembly: Assembly, start: State, load: Reals, reach: float, tolerance: float) -> None:
+        self.symmetric = len(assembly.free) <= _SYMMETRIC_UP_TO
         self.assembly, self.load, self.state, self.reach = assembly, load, start, reach
         self.tolerance = tolerance
         self.now = assembly.evaluate(start)
@@ -302,7 +308,7 @@ class _Relaxation:
         Exact symmetry is for small models; large ones are spared the factorisation, which isn't blocked and
         takes a hundred times as long as Cholesky's.
         """
-        if len(self.assembly.free) > _SYMMETRIC_UP_TO:
+        if not self.symmetric:
             return False
         if self.patience > 0:
             self.patience -= 1
