@@ -105,7 +105,13 @@ def with_ways_out(
         if way_out is None:
             refusal = refusal.in_vain()
             way_out = _poured_first(refusal, surface, wish, say, whole.rest(_TRIED))
-    if way_out is None and isinstance(refusal, Falls) and _may_be_less(refusal, wish) and not whole.over:
+    known = isinstance(refusal, Falls) and refusal.design is not None
+    if (
+        way_out is None
+        and isinstance(refusal, Falls)
+        and _may_be_less(refusal, wish)
+        and (known or not whole.over)
+    ):
         way_out = _poured_first(refusal, surface, wish, say, whole.rest(_TRIED))
         refusal = refusal if way_out is not None else refusal.in_vain()
     return Refused(refusal, way_out)
@@ -315,13 +321,15 @@ def _may_be_less(refusal: Unbuildable | Falls, wish: DesignWish) -> bool:
 def _poured_first(
     refusal: Unbuildable | Falls, surface: Surface, wish: DesignWish, say: Say, allowance: Allowance
 ) -> WayOut | None:
-    """A first layer of concrete; None where none is known to be borne."""
+    """A first layer of concrete, looked for from the start, or as it was found where the work is done; None
+    where none is known to be borne."""
     if not _may_be_less(refusal, wish):
         return None
     assert refusal.bears is not None
     how, layer = f"with {1e3 * refusal.bears:g} mm", replace(wish, thickness=refusal.bears)
+    design = refusal.design if allowance.over else None
     try:
-        design = _trial(how, surface, layer, allowance, say)
+        design = design or _trial(how, surface, layer, allowance, say)
     except (InputError, NotConverged) as error:
         say(f"{how}: {error}")
         return None

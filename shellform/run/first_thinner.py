@@ -56,7 +56,7 @@ def with_thinner_concrete(
         raise refused(surface, told, wish)
     too_thin = design.thickness < least and not allowance.thin_layers
     if wish.thickness is not None or too_thin:
-        raise refused(surface, replace(told, thickness=thickness), wish, bears=design.thickness)
+        raise refused(surface, replace(told, thickness=thickness), wish, design=design)
     return design
 
 

@@ -27,6 +27,7 @@ EASES = 1.4  # times the load that heavier edge beams have to let it bear, or th
 _THINNED = 8  # trials with less concrete
 # of drawn structures; of a shell of which fewer stand two thirds of the concrete are tried, not four fifths
 _FEW, _FEW_STAND = 0.2, 0.65
+_MOST_STAND = 0.5  # of drawn structures: with a little less concrete all do, which is worth going on for
 _TOO_THIN = 0.3  # of the least layer: nobody pours so little
 AIMED = 0.92  # of what rods may be stressed to, for which concrete is thinned
 _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help
@@ -250,13 +251,16 @@ def thinned(
     thinned for those that bear most, to about what the last trial says that they bear. Rods that would break
     without any concrete give way to less deep ones under as much as before. `stands` tries a net, rods, a
     spacing and a thickness, m; `least`, m, is the thinnest layer that is poured; nothing is tried once it is
-    `over`, nor with as much concrete as the failure's those that were `tried` with it before.
+    `over`, unless most structures stood in the last trial, nor with as much concrete as the failure's those
+    that were `tried` with it before.
     """
     assert failure.choice is not None
     rods, thickness = failure.choice, failure.thickness
     seen, less_deep = {rods, *tried}, None
     for _ in range(_THINNED):
-        if failure.factor == 0.0 or over():  # without any concrete it doesn't stand
+        if failure.factor == 0.0:  # without any concrete it doesn't stand
+            break
+        if over() and not (failure.why is Why.SCATTER and failure.stood >= _MOST_STAND):
             break
         assert failure.placed is not None
         other = less_deep or rods

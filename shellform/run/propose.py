@@ -39,7 +39,7 @@ from shellform.run.first_trial import (
 from shellform.run.narrow_holes import narrow_holes
 from shellform.run.plinths import plinths_for
 from shellform.run.proposed_edges import edge_beams_table, edge_beams_told, edges_told, named
-from shellform.run.proposed_shape import built_deviation, optimise_table, stray_told
+from shellform.run.proposed_shape import built_deviation, optimise_table, rods_strength, stray_told
 from shellform.run.sizes import THICKNESS, DesignWish, RodChoice, usual_thickness
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
@@ -279,7 +279,7 @@ name = "additional"  # the case under which the shell must still stand, constrai
 factors = {{ concrete = {ADDITIONAL!r}, rods = {ADDITIONAL!r} }}   # the design load lies on its path, so that structures are loaded once for both
 
 [limits]
-utilisation = 1.0    # of the rods' strength, under any load
+{rods_strength(design)}
 {built_deviation(surface, design, stray)}
 
 {optimise_table(surface, design)}

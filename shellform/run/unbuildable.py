@@ -24,7 +24,7 @@ from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
 from shellform.quantities import coordinates, number
 from shellform.run.first_net import bends_to
-from shellform.run.first_trial import NEEDED, STRESSED
+from shellform.run.first_trial import NEEDED, STRESSED, FirstDesign
 from shellform.run.sizes import DesignWish, Placed, RodChoice, least_spacing, radius_for
 from shellform.run.way_out import COVERED
 from shellform.surface.readers.reading import states_unit
@@ -47,7 +47,7 @@ _MORE_RISE = "Give the surface more rise: buckling grows with the square of its 
 class Unbuildable(InputError):
     """A surface that no net of the `spacing`, m, covers, or that no rod follows there, for the reason `why`;
     rounded to the `radius`, m, it may be built, or with the thickness of concrete, m, that it `bears`, if one
-    was found."""
+    was found, as the `design` does."""
 
     def __init__(
         self,
@@ -59,8 +59,9 @@ class Unbuildable(InputError):
         spacing: float,
         radius: float,
         bears: float | None = None,
+        design: FirstDesign | None = None,
     ) -> None:
-        self.why, self.spacing, self.radius, self.bears = why, spacing, radius, bears
+        self.why, self.spacing, self.radius, self.bears, self.design = why, spacing, radius, bears, design
         super().__init__(what, where=where, remedy=remedy)
 
     def in_vain(self) -> Unbuildable:
@@ -74,15 +75,18 @@ class Unbuildable(InputError):
             spacing=self.spacing,
             radius=self.radius,
             bears=self.bears,
+            design=self.design,
         )
 
 
 class Falls(NotConverged):
     """A shell that its load brings down, or stresses too much, for the reason `what`; `bears`: the thickness
-    of concrete, m, with which it was found to stand, if one was."""
+    of concrete, m, with which it was found to stand, if one was, as the `design` does."""
 
-    def __init__(self, what: str, *, remedy: str, bears: float | None = None) -> None:
-        self.bears = bears
+    def __init__(
+        self, what: str, *, remedy: str, bears: float | None = None, design: FirstDesign | None = None
+    ) -> None:
+        self.bears, self.design = bears, design
         super().__init__(what, residual=math.nan, iterations=0, remedy=remedy)
 
     def in_vain(self) -> Falls:
@@ -224,16 +228,16 @@ def refuse_tipping(net: Net) -> None:
 
 
 def refused(
-    surface: Surface, failure: Obstacle | None, wish: DesignWish, *, bears: float | None = None
+    surface: Surface, failure: Obstacle | None, wish: DesignWish, *, design: FirstDesign | None = None
 ) -> InputError | NotConverged:
-    """What to say of a shell that can't be built: as an error, to be raised. `bears`: a thickness of
-    concrete, m, that was found to stand."""
+    """What to say of a shell that can't be built: as an error, to be raised. `design`: one with less concrete
+    that was found to stand."""
     if failure is None or failure.why is Why.NET:
         return _uncovered(surface, failure, wish)
     choice = failure.choice
     assert choice is not None
-    much = bears is not None and bears >= 0.5 * failure.thickness
-    crease = None if much else _crease(surface, failure, wish, bears)
+    much = design is not None and design.thickness >= 0.5 * failure.thickness
+    crease = None if much else _crease(surface, failure, wish, design)
     if crease is not None:
         return crease
     if failure.why is Why.SPACING:
@@ -242,9 +246,9 @@ def refused(
             where="--spacing",
             remedy=f"Give --spacing {least_spacing(choice):g} or more, or thinner rods with --rod.",
         )
-    if failure.why is Why.CURVATURE or (failure.why is Why.STRENGTH and bears is None):
+    if failure.why is Why.CURVATURE or (failure.why is Why.STRENGTH and design is None):
         return _broken(surface, failure, choice, wish)
-    return _fallen(failure, choice, bears)
+    return _fallen(failure, choice, design)
 
 
 def _uncovered(surface: Surface, failure: Obstacle | None, wish: DesignWish) -> Unbuildable:
@@ -290,7 +294,7 @@ def _broken(surface: Surface, failure: Obstacle, choice: RodChoice, wish: Design
     )
 
 
-def _fallen(failure: Obstacle, choice: RodChoice, bears: float | None) -> Falls:
+def _fallen(failure: Obstacle, choice: RodChoice, design: FirstDesign | None) -> Falls:
     """The refusal of a shell that falls under its load, or is stressed too much by it."""
     bearing = {Why.EDGES: "edge beams", Why.CABLES: "cables"}.get(failure.why, "rods")
     falls = failure.factor < NEEDED or failure.why is Why.SCATTER
@@ -300,6 +304,7 @@ def _fallen(failure: Obstacle, choice: RodChoice, bears: float | None) -> Falls:
         f"where {NEEDED:g} is needed, its {bearing} at {failure.stress:.0%} of {'what they may bear' if failure.why is Why.CABLES else 'their strength'}"
         f"{f', and gives way first{_place(failure)}' if falls else ''}"
     )
+    bears = None if design is None else design.thickness
     if bears is not None:
         layer = (
             "A single layer of rods bears" if layers_of(choice.section) == 1 else "Rods in two layers bear"
@@ -307,7 +312,7 @@ def _fallen(failure: Obstacle, choice: RodChoice, bears: float | None) -> Falls:
         remedy = f"{layer} --thickness {bears:g}: pour that first, and the rest when it has hardened."
     else:
         remedy = _MORE_RISE
-    return Falls(what, remedy=remedy, bears=bears)
+    return Falls(what, remedy=remedy, bears=bears, design=design)
 
 
 def _place(failure: Obstacle) -> str:
@@ -331,7 +336,9 @@ def flat_between_creases(surface: Surface) -> bool:
     return float(surface.size[:2].max()) * curvature_usual(surface) < 1.0
 
 
-def _crease(surface: Surface, failure: Obstacle, wish: DesignWish, bears: float | None) -> Unbuildable | None:
+def _crease(
+    surface: Surface, failure: Obstacle, wish: DesignWish, design: FirstDesign | None
+) -> Unbuildable | None:
     """The refusal of a surface on which the rods that can follow it at one spot are too thin to bear the
     load, while nearly all of it takes thicker ones; None where that isn't so."""
     placed, choice = failure.placed, failure.choice
@@ -351,7 +358,8 @@ def _crease(surface: Surface, failure: Obstacle, wish: DesignWish, bears: float 
         remedy="Round it there, so that thicker rods follow it.",
         spacing=failure.spacing,
         radius=wanted,
-        bears=bears,
+        bears=None if design is None else design.thickness,
+        design=design,
     )
 
 

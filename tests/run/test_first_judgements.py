@@ -108,6 +108,20 @@ def test_concrete_is_thinned_by_what_the_design_falls_short_of(why, factor, stoo
     assert tried == [millimetres]
 
 
+@pytest.mark.parametrize(("stood", "tried"), [(0.5, [40.0]), (0.49, [])])
+def test_once_the_work_is_done_concrete_is_thinned_on_only_where_most_structures_stood(stood, tried):
+    asked = []
+
+    def stands(placed, choice, spacing, thickness):
+        asked.append(round(1e3 * thickness, 6))
+        return STANDS
+
+    choice = Choice(sf.Rod.round(young=40e9, radius=0.01).section)
+    failure = Obstacle(Why.SCATTER, 0.5, 0.05, 1.6, choice, SimpleNamespace(net=None), stood=stood)
+    next_trial.thinned(failure, failure, [], 0.015, stands, lambda: True)
+    assert asked == tried
+
+
 def test_concrete_is_thinned_for_the_rods_that_broke_where_less_stressed_ones_fall(monkeypatch):
     """At once after ones that fall, where thinning for these would end with next to none."""
     deep, thin = (Choice(sf.Rod.round(young=40e9, radius=radius).section) for radius in (0.02, 0.01))

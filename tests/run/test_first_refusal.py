@@ -155,3 +155,18 @@ def test_of_a_shell_that_falls_the_layer_that_stood_is_tried_from_the_start_befo
         assert found.offered.remedy.startswith("Give the surface more rise"), "not what was tried in vain"
     else:
         assert found.offered is falls
+
+
+def test_what_was_found_to_stand_with_less_concrete_is_the_way_out_where_the_work_is_done(
+    tmp_path, monkeypatch
+):
+    """Of a shell of 7 m, forty structures of which took 75 s, no work was left to look for it again."""
+    monkeypatch.setattr(first_refusal, "standing_design", None)
+    monkeypatch.setattr(first_refusal, "stretches_of", lambda surface: [])
+    falls = Falls("falls", remedy="Rods bear --thickness 0.013.", bears=0.013, design=STANDS)
+    found = first_refusal.with_ways_out(
+        falls, None, DesignWish(), tmp_path / "a.toml", lambda text: None, first_refusal.Allowance(0)
+    )
+    assert found.way_out.design is STANDS
+    assert found.way_out.wish.thickness == 0.013
+    assert found.offered.remedy.startswith("With --thickness 0.013 this goes on")

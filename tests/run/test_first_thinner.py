@@ -33,8 +33,8 @@ def thinner(monkeypatch):
         found = told.comes_to.get(failure.why)
         return failure, None if found is None else SimpleNamespace(thickness=1e-3 * found)
 
-    def refused(surface, failure, wish, *, bears=None):
-        return Said(failure.why, failure.thickness, bears)
+    def refused(surface, failure, wish, *, design=None):
+        return Said(failure.why, failure.thickness, design and design.thickness)
 
     monkeypatch.setattr(first_thinner, "thinned", thinned)
     monkeypatch.setattr(first_thinner, "refused", refused)

@@ -29,7 +29,7 @@ from shellform.run.first_refusal import Refused, WayOut
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts, Followed
 from shellform.run.propose import propose_case
 from shellform.run.proposed_edges import edge_beams_table, edge_beams_told
-from shellform.run.proposed_shape import built_deviation, optimise_table, stray_told
+from shellform.run.proposed_shape import built_deviation, optimise_table, rods_strength, stray_told
 from shellform.run.sizes import (
     LEAST_PRESTRAIN,
     STRAINED,
@@ -317,7 +317,9 @@ def test_a_crease_is_told_as_the_reason_where_the_rods_that_follow_it_bear_too_l
     assert isinstance(told, Unbuildable)
     assert told.what.startswith("at (")
     assert told.radius > 1.3 / placed.net.quality.curvature_max
-    thick = refused(surface, replace(failure, factor=1.2), DesignWish(), bears=0.04)
+    thick = refused(
+        surface, replace(failure, factor=1.2), DesignWish(), design=SimpleNamespace(thickness=0.04)
+    )
     assert "--thickness 0.04" in thick.remedy
 
 
@@ -718,3 +720,11 @@ def test_concrete_that_no_single_layer_bears_is_refused_and_the_thickness_named_
     assert found.thickness == bears < wish.thickness
     assert found.tried.factor >= NEEDED
     assert found.standing == found.drawn
+
+
+@pytest.mark.parametrize(("stress", "limit"), [(0.85, 0.9), (0.86, 1.0)])
+def test_a_tenth_of_the_rods_strength_is_left_for_errors_where_the_initial_design_leaves_more(stress, limit):
+    entry = rods_strength(SimpleNamespace(tried=SimpleNamespace(stress=stress)))
+    assert tomllib.loads(entry) == {"utilisation": limit}
+    assert ("for errors of building" in entry) == (limit < 1.0 or "comes to 0.86" in entry)
+    assert ("0.86" in entry) == (limit == 1.0)

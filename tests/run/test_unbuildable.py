@@ -295,14 +295,14 @@ def test_creases_are_rounded_for_the_load_up_to_what_most_of_the_surface_keeps_a
 def test_a_crease_is_the_reason_where_rounding_lets_rods_bend_a_third_less(monkeypatch, wanted, told, why):
     monkeypatch.setattr(unbuildable, "_rounding", lambda *_: wanted)
     failure = Obstacle(why, 0.5, 0.05, 0.7, rods(), placed(0.8), stress=0.8)
-    found = refused(None, failure, DesignWish(), bears=0.02)
+    found = refused(None, failure, DesignWish(), design=SimpleNamespace(thickness=0.02))
     if why not in (Why.STABILITY, Why.STRENGTH) or not told:
         assert not isinstance(found, Unbuildable)
         return
     assert (found.why, found.radius, found.bears, found.spacing) == (Why.CURVATURE, wanted, 0.02, 0.5)
     assert "at (0.5, 1, 2) m rods bend to a radius of 1.25 m" in found.what
     assert "up to 0.70 × the load of 50 mm of concrete at 0.5 m, where 1.5 is needed" in found.what
-    thick = refused(None, failure, DesignWish(), bears=0.025)
+    thick = refused(None, failure, DesignWish(), design=SimpleNamespace(thickness=0.025))
     assert not isinstance(thick, Unbuildable), "half of what was asked for stands without"
 
 
@@ -359,7 +359,7 @@ def test_what_falls_or_breaks_under_its_load_is_refused_with_what_stands(
     no_crease, why, factor, words, bears
 ):
     failure = Obstacle(why, 0.4, 0.06, factor, rods(), placed(0.25), np.array([1.0, 2.0, 3.0]), 0.8)
-    told = refused(None, failure, DesignWish(), bears=bears)
+    told = refused(None, failure, DesignWish(), design=bears and SimpleNamespace(thickness=bears))
     if why is Why.STRENGTH and bears is None:
         assert isinstance(told, Unbuildable)
         return
