@@ -185,9 +185,11 @@ def nearness(quality: Quality, grid: Grid, state: State) -> str:
     worst = int(np.argmax(np.abs(error)))
     points = crossing_points(grid, state)
     place = points[neighbours(grid)[0][worst]].mean(axis=0).round(3).tolist()
+    off, usual = 100.0 * abs(error[worst]), f"{100.0 * SPACING_ERROR:.2f}"
+    told = f"{off:.2f}" if f"{off:.2f}" != usual else f"{off:.4f}"  # what it may be isn't what it is
     return (
-        f"crossings at {place} lie {100.0 * abs(error[worst]):.2f} % {'nearer' if error[worst] < 0.0 else 'farther'} "
-        f"than their spacing, where up to {100.0 * SPACING_ERROR:.2f} % is usual: rods are bent there too sharply for "
+        f"crossings at {place} lie {told} % {'nearer' if error[worst] < 0.0 else 'farther'} "
+        f"than their spacing, where up to {usual} % is usual: rods are bent there too sharply for "
         "their spacing or the gap between them"
     )
 
