@@ -321,18 +321,19 @@ def _may_be_less(refusal: Unbuildable | Falls, wish: DesignWish) -> bool:
 def _poured_first(
     refusal: Unbuildable | Falls, surface: Surface, wish: DesignWish, say: Say, allowance: Allowance
 ) -> WayOut | None:
-    """A first layer of concrete, looked for from the start, or as it was found where the work is done; None
-    where none is known to be borne."""
+    """A first layer of concrete, looked for from the start, or as it was found where the work ends before;
+    None where none is known to be borne."""
     if not _may_be_less(refusal, wish):
         return None
     assert refusal.bears is not None
     how, layer = f"with {1e3 * refusal.bears:g} mm", replace(wish, thickness=refusal.bears)
-    design = refusal.design if allowance.over else None
     try:
-        design = design or _trial(how, surface, layer, allowance, say)
+        design = _trial(how, surface, layer, allowance, say)
     except (InputError, NotConverged) as error:
         say(f"{how}: {error}")
-        return None
+        if refusal.design is None or not allowance.over:
+            return None
+        design = refusal.design
     return WayOut(
         design,
         layer,

@@ -161,12 +161,21 @@ def test_what_was_found_to_stand_with_less_concrete_is_the_way_out_where_the_wor
     tmp_path, monkeypatch
 ):
     """Of a shell of 7 m, forty structures of which took 75 s, no work was left to look for it again."""
-    monkeypatch.setattr(first_refusal, "standing_design", None)
+
+    def search(surface, wish, say, allowance, *, finer=False):
+        allowance.spend(takes["work"])
+        raise NotConverged("falls")
+
+    monkeypatch.setattr(first_refusal, "standing_design", search)
     monkeypatch.setattr(first_refusal, "stretches_of", lambda surface: [])
     falls = Falls("falls", remedy="Rods bear --thickness 0.013.", bears=0.013, design=STANDS)
-    found = first_refusal.with_ways_out(
-        falls, None, DesignWish(), tmp_path / "a.toml", lambda text: None, first_refusal.Allowance(0)
-    )
-    assert found.way_out.design is STANDS
-    assert found.way_out.wish.thickness == 0.013
-    assert found.offered.remedy.startswith("With --thickness 0.013 this goes on")
+    takes = {}
+    for work, takes["work"], goes_on in ((0, 0, True), (1000, 900, True), (1000, 100, False)):
+        found = first_refusal.with_ways_out(
+            falls, None, DesignWish(), tmp_path / "a.toml", lambda text: None, first_refusal.Allowance(work)
+        )
+        assert (found.way_out is not None) is goes_on, "with work left it was looked for in vain"
+        if goes_on:
+            assert found.way_out.design is STANDS
+            assert found.way_out.wish.thickness == 0.013
+            assert found.offered.remedy.startswith("With --thickness 0.013 this goes on")
