@@ -28,6 +28,9 @@ from shellform.structure.network import connected
 
 _SHORTEST_ELEMENT = 0.35  # of the ordinary element's length; a shorter last one is joined to its neighbour
 FEWEST = 2  # joints on a rod
+# spacings², of the product of both parts of a rod that stays with one joint: what its supports are off by
+# bends it by three times that over the product
+_SINGLE = 0.75
 # a rod that has no joint over more than so many spacings, and over more than this share of it, runs beside
 # the edge
 _FREE, _FREE_SHARE = 2.5, 0.4
@@ -225,7 +228,13 @@ def _keep(
     for each in loose:
         remaining -= each.keys()
     while True:
-        poor = [each for each in joints if 0 < len(remaining & each.keys()) < fewest]
+        poor = [
+            each
+            for piece, each in zip(pieces, joints, strict=True)
+            if _poor(
+                piece, [each[c] for c in remaining & each.keys()], grid.step(piece.rod.direction), fewest
+            )
+        ]
         if not poor:
             break
         for each in poor:
@@ -277,6 +286,14 @@ def _loose(piece: _Piece, arcs: list[float], step: float) -> bool:
     much of it. Beside an opening rods that go on far beyond it stay."""
     free = float(np.diff(np.sort([piece.start, *arcs, piece.end])).max())
     return len(arcs) > 0 and free > max(_FREE * step, _FREE_SHARE * (piece.end - piece.start))
+
+
+def _poor(piece: _Piece, arcs: list[float], step: float, fewest: int) -> bool:
+    """Whether joints at the `arcs` are too few, fewer than the `fewest`, or one on a rod so short that what
+    its supports are off by would bend it too much."""
+    if len(arcs) != 1 or fewest > 1:
+        return 0 < len(arcs) < fewest
+    return (arcs[0] - piece.start) * (piece.end - arcs[0]) < _SINGLE * step**2
 
 
 def _largest(joints: list[dict[int, float]], remaining: set[int]) -> set[int]:

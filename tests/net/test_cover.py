@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.net import chebyshev, cover
+from shellform.net import chebyshev, cover, trim
 from shellform.net.chebyshev import NetSettings, pull_net
 from shellform.net.grid import lattice_grid
 from shellform.net.ladder import climbed_net
@@ -127,6 +127,25 @@ def test_rods_of_a_single_joint_stay_where_else_more_would_be_bare(monkeypatch):
     assert len(before.grid.rods) < len(net.grid.rods)
     assert before.cover.bare - net.cover.bare > 0.5 * 0.5**2
     assert before.quality.uncovered_area == before.cover.bare
+
+
+@pytest.mark.parametrize(
+    ("arcs", "fewest", "poor"),
+    [
+        ([0.5], 2, True),
+        ([0.5], 1, False),
+        ([0.37], 1, True),  # 0.37 and 0.63 m at 0.5 m: 0.93 of 1.0 spacings²
+        ([0.2, 0.6], 1, False),
+        ([0.2, 0.6], 2, False),
+        ([], 1, False),
+    ],
+)
+def test_a_rod_stays_with_one_joint_where_its_supports_errors_bend_it_little(monkeypatch, arcs, fewest, poor):
+    """Three times what they are off by over the product of its two parts: of 0.54 m with parts of 0.36 and
+    0.18 m supports 5 mm off made 8 times its strength."""
+    monkeypatch.setattr(trim, "_SINGLE", 1.0)
+    piece = SimpleNamespace(start=0.0, end=1.0)
+    assert trim._poor(piece, arcs, 0.5, fewest) is poor
 
 
 def test_where_nothing_is_bare_rods_of_a_single_joint_are_left_out():
