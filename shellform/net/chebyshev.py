@@ -364,7 +364,7 @@ def _measured(finder: Finder, oversized: Grid, pulled: Pulled, trimmed: Trimmed,
     refuse_distance(quality, grid, state)
     near = nearness(quality, grid, state)
     told = (NetNote(NoteKind.NEAR, near),) if near else ()
-    return Net(grid, state, trimmed.supports, quality, covered, (*trimmed.notes, *told))
+    return Net(grid, state, trimmed.supports, quality, (*trimmed.notes, *told), cover=covered)
 
 
 def _curvature(oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> Reals:

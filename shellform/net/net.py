@@ -66,21 +66,21 @@ class Net(Record):
     - `grid`: flat; `target`: its state on the surface, (n,) nodes.
     - `supports` (s,): the nodes that are held, which are the rods' ends, but for those on edge beams and free
       ones (edges.py), and the edge beams' feet.
-    - `quality`: how good it is; `cover`: where it leaves the surface bare (None: not known of older ones);
-      `notes`: what was left out.
+    - `quality`: how good it is; `notes`: what was left out.
     - `attempts` at it, the last of which gave it; none where the first did.
     - `edges`: the edge beams; `stretches`: what the edge is, part after part (none: not asked).
+    - `cover`: where it leaves the surface bare (None: not known of older ones).
     """
 
     grid: Grid
     target: State
     supports: Indices
     quality: Quality
-    cover: Cover | None = None
     notes: tuple[NetNote, ...] = ()
     attempts: tuple[Attempt, ...] = ()
     edges: tuple[EdgeLine, ...] = ()
     stretches: tuple[Stretch, ...] = ()
+    cover: Cover | None = None
 
     def __post_init__(self) -> None:
         count = self.node_count
