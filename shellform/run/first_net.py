@@ -65,6 +65,7 @@ class Allowance:
     bore: float = 0.0
     whole: Allowance | None = None
     left: int = field(init=False)
+    _was_over: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         self.left = self.work
@@ -73,6 +74,12 @@ class Allowance:
     def over(self) -> bool:
         """Whether nothing new may begin."""
         return self.left <= 0 or (self.whole is not None and self.whole.over)
+
+    @property
+    def ran_out(self) -> bool:
+        """Whether it is over, or was before some was left to it: what came of it then was not looked for to
+        its end."""
+        return self._was_over or self.over
 
     @classmethod
     def for_size(cls, surface: Surface, spacing: float | None) -> Allowance:
@@ -92,6 +99,7 @@ class Allowance:
 
     def leave(self, share: float) -> None:
         """Sees to it that a `share` of its work is left, at the cost of what else the whole is for."""
+        self._was_over = self.ran_out
         self.left = max(self.left, round(share * self.work))
 
     def spend(self, crossings: float, times: int = 1) -> None:

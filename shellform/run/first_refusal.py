@@ -331,7 +331,7 @@ def _poured_first(
         design = _trial(how, surface, layer, allowance, say)
     except (InputError, NotConverged) as error:
         say(f"{how}: {error}")
-        if refusal.design is None or not allowance.over:
+        if refusal.design is None or not allowance.ran_out:
             return None
         design = refusal.design
     return WayOut(
