@@ -108,7 +108,8 @@ class Followed(Record):
     """What a design came to: the `factor` of its load up to which it stands; under the additional load the
     stress over the strength of its rods (`stress`), where that is (`most_stressed` (3,), m), and of its edge
     beams (`edge`), how far these are off at most (`sag`, m), how far the whole shell is (`off`, m), and the
-    cables' largest force over its limit (`pull`); `where` (3,), m, the last state is farthest off."""
+    cables' largest force over its limit (`pull`); `where` (3,), m, the last state is farthest off; the rods'
+    stress before any load (`unloaded`)."""
 
     factor: float
     stress: float
@@ -118,6 +119,7 @@ class Followed(Record):
     pull: float
     where: Reals
     most_stressed: Reals
+    unloaded: float = 0.0
 
     @property
     def sag_told(self) -> str:
@@ -163,10 +165,11 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
     design = shell.design(rest_ratio=parts.rest_ratio)
     assembly = assemble(shell.network(design))
     none = np.zeros((shell.node_count, 6))
-    factor, borne = 0.0, none
+    factor, borne, unloaded = 0.0, none, 0.0
     state, stressed = shell.target, shell.target
     try:
         state = find_equilibrium(assembly, shell.target, none, tolerance=_SETTLED, limit=_UNLOADED).state
+        unloaded = float(shell.utilisation(design, state).max())
         for goal in (ADDITIONAL, NEEDED):  # the stress counts under the first
             more = goal * load
             found = apply_load(
@@ -192,6 +195,7 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
         pull=float(shell.cables(design).tension(stressed).max(initial=0.0)) / parts.rope.force_max,
         where=shell.target.positions[int(np.argmax(away))],
         most_stressed=shell.target.positions[breaks].mean(axis=0),
+        unloaded=unloaded,
     )
 
 

@@ -39,11 +39,12 @@ def stray_told(design: FirstDesign, surface: Surface, steady: WayOut | None) -> 
 
 def rods_strength(design: FirstDesign) -> str:
     """The entry of [limits] for the rods' stress."""
-    if design.tried.stress <= _BEGUN:
+    begun = max(design.tried.stress, design.tried.unloaded)
+    if begun <= _BEGUN:
         return f"utilisation = {_LEFT!r}    # of the rods' strength, under any load: the rest is for errors of building"
     return (
         f"utilisation = 1.0    # of the rods' strength, under any load; {_LEFT!r} would leave some for errors of building, and the "
-        f"initial design comes to {design.tried.stress:.2f}"
+        f"initial design comes to {begun:.2f}"
     )
 
 
