@@ -28,6 +28,7 @@ UNCOVERED = 0.02  # of the surface: more of it is refused
 NOTABLE = 0.25  # of a cell: less that is bare is not worth a word
 _SAMPLE, _MOST_PARTS = 0.25, 32  # of the spacing, between samples; parts of a triangle's side
 _BESIDE = 1.2  # times the farthest that samples beside one another lie apart
+_TOUCHING = 1.8  # sides between two boxes that share a face, an edge or a corner, at the most
 _NAMED = 4  # patches that are told one by one
 
 
@@ -96,23 +97,27 @@ def _samples(parts: int) -> Reals:
 
 
 def _patches(places: Reals, away: Reals, area: Reals, apart: float) -> tuple[BarePatch, ...]:
-    """The bare samples at `places` (k, 3) put together where they lie no farther `apart`."""
+    """The bare samples at `places` (k, 3) put together where they lie in boxes of the side `apart`, m, that
+    touch: of a fine mesh far too many lie beside one another to be looked at pair by pair."""
     if not len(places):
         return ()
-    count, label = connected(len(places), cKDTree(places).query_pairs(apart, output_type="ndarray"))
-    found = []
-    for number_of in range(count):
-        own = np.flatnonzero(label == number_of)
-        farthest = own[np.argmax(away[own])]
-        x, y, z = places[farthest].tolist()
-        found.append(BarePatch(float(area[own].sum()), (x, y, z), float(away[farthest])))
+    boxes, box = np.unique(np.floor(places / apart), axis=0, return_inverse=True)
+    _, label = connected(len(boxes), cKDTree(boxes).query_pairs(_TOUCHING, output_type="ndarray"))
+    patch = label[box.ravel()]
+    areas = np.bincount(patch, area)
+    by_patch = np.lexsort((away, patch))
+    farthest = by_patch[np.append(np.flatnonzero(np.diff(patch[by_patch])), len(patch) - 1)]
+    found = [
+        BarePatch(float(areas[k]), (x, y, z), float(away[farthest[k]]))
+        for k, (x, y, z) in enumerate(places[farthest].tolist())
+    ]
     return tuple(sorted(found, key=lambda each: (-each.area, each.place)))
 
 
 def patches_told(patches: tuple[BarePatch, ...]) -> str:
     """Where they are, in words: "1.4 m² at (0.4, 1.9, 6.9) m, up to 1.3 m from any rod"."""
     told = [
-        f"{number(each.area, 2)} m² at {coordinates(np.array(each.place))} m, up to {number(each.away, 2)} m from any rod"
+        f"{number(each.area, 2)} m² at {coordinates(each.place)} m, up to {number(each.away, 2)} m from any rod"
         for each in patches[:_NAMED]
     ]
     more = len(patches) - _NAMED
