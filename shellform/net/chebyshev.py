@@ -42,8 +42,9 @@ from shellform.net.pull import (
 )
 from shellform.net.quality import measure, nearness, refuse_distance, refuse_folds
 from shellform.net.refusal import NoNet, Reason
-from shellform.net.trim import Limits, Trimmed, Uncovered, bare_rods, trim
+from shellform.net.trim import FEWEST, Limits, Trimmed, Uncovered, bare_rods, trim
 from shellform.quantities import LENGTHS, MILLIMETRES, if_other_unit
+from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.locate import Locator
 from shellform.surface.shape.target import Surface
@@ -215,13 +216,10 @@ def net_at(
                     reach=tuned.reach,
                     tolerance=tuned.tolerance,
                 )
-            trimmed = trim(grid, pulled.state, finder, merge=settings.merge, limits=limits)
+            trimmed, covered = _trimmed(surface, finder, grid, pulled.state, settings)
         except Uncovered as error:
             bare = error.rods
             continue
-        covered = cover(surface, trimmed.grid, trimmed.state, limits.within)
-        if covered.patches:
-            trimmed, covered = _less_bare(surface, finder, grid, pulled, settings, trimmed, covered)
         return _net(finder, grid, pulled, trimmed, covered, settings.uncovered_max)
     raise _short(bare, angle)
 
@@ -323,23 +321,22 @@ def _densities(given: Sequence[float] | None, start: Start) -> Sequence[float]:
     return given
 
 
-def _less_bare(
-    surface: Surface,
-    finder: Finder,
-    oversized: Grid,
-    pulled: Pulled,
-    settings: NetSettings,
-    trimmed: Trimmed,
-    covered: Cover,
+def _trimmed(
+    surface: Surface, finder: Finder, grid: Grid, state: State, settings: NetSettings
 ) -> tuple[Trimmed, Cover]:
-    """The grid trimmed so that rods of a single joint stay too, and what it covers, where that is worth it;
-    else as it is."""
+    """The pulled grid trimmed, and what it covers: rods of a single joint stay where a notable part less is
+    bare with them. Raises Uncovered."""
     limits = _limits(settings)
-    more = trim(oversized, pulled.state, finder, merge=settings.merge, limits=limits, fewest=1)
-    found = cover(surface, more.grid, more.state, limits.within)
-    if covered.bare - found.bare < NOTABLE * more.grid.spacing * more.grid.spacing_v:
-        return trimmed, covered
-    return more, found
+
+    def kept(fewest: int) -> tuple[Trimmed, Cover]:
+        found = trim(grid, state, finder, merge=settings.merge, limits=limits, fewest=fewest)
+        return found, cover(surface, found.grid, found.state, limits.within)
+
+    usual, notable = kept(FEWEST), NOTABLE * grid.scale**2
+    if usual[1].bare < notable:
+        return usual
+    more = kept(1)
+    return more if usual[1].bare - more[1].bare >= notable else usual
 
 
 def _net(

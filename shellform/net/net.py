@@ -125,7 +125,7 @@ class Net(Record):
     @property
     def bare_cells(self) -> float:
         """How many of its cells the surface beyond its rods would fill."""
-        return self.quality.uncovered_area / (self.grid.spacing * self.grid.spacing_v)
+        return self.quality.uncovered_area / self.grid.scale**2
 
     @property
     def crossings(self) -> Reals:
