@@ -25,7 +25,7 @@ from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.orientation import cost
 from shellform.net.quality import refuse_nearness
-from shellform.net.refusal import NoNet, Stalled
+from shellform.net.refusal import Attempt, NoNet, Stalled
 from shellform.quantities import number
 from shellform.run.first_trial import ELEMENTS
 from shellform.run.sizes import MOST_CROSSINGS, Placed
@@ -206,7 +206,7 @@ def least_bent_net(
     except (NoNet, Stalled) as error:
         allowance.spend(crossings * _share_of_pull(_taken(error) - _taken(failed)))
         raise
-    allowance.spend(crossings * _climbed(net, first=False))
+    allowance.spend(crossings * _climbed(net.attempts[1:-1]))
     return FirstNets(Placed(net, math.degrees(given.angle), given.offset), ())
 
 
@@ -237,7 +237,7 @@ def with_gap(
     except (NoNet, Stalled) as error:
         allowance.spend(crossings * _share_of_pull(_taken(error)))
         raise
-    allowance.spend(crossings * _climbed(net, first=True))
+    allowance.spend(crossings * _climbed(net.attempts[:-1]))
     return Placed(stand(net, surface, edges), math.degrees(given.angle), given.offset)
 
 
@@ -286,10 +286,9 @@ def _share_of_pull(factorisations: int) -> float:
     return max(factorisations, _AT_ONCE) / _A_PULL
 
 
-def _climbed(net: Net, *, first: bool) -> float:
-    """What the attempts at a net cost that failed, the `first` too or not, and then the one that gave it, in
-    pulls that end with a net."""
-    failed = net.attempts[:-1] if first else net.attempts[1:-1]
+def _climbed(failed: Sequence[Attempt]) -> float:
+    """What attempts at a net that `failed` cost, and then the one that gave it, in pulls that end with a
+    net."""
     return 1.0 + sum(_share_of_pull(each.factorisations) for each in failed)
 
 

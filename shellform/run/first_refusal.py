@@ -105,13 +105,7 @@ def with_ways_out(
         if way_out is None:
             refusal = refusal.in_vain()
             way_out = _poured_first(refusal, surface, wish, say, whole.rest(_TRIED))
-    known = isinstance(refusal, Falls) and refusal.design is not None
-    if (
-        way_out is None
-        and isinstance(refusal, Falls)
-        and _may_be_less(refusal, wish)
-        and (known or not whole.over)
-    ):
+    if way_out is None and isinstance(refusal, Falls) and _may_be_less(refusal, wish):
         way_out = _poured_first(refusal, surface, wish, say, whole.rest(_TRIED))
         refusal = refusal if way_out is not None else refusal.in_vain()
     return Refused(refusal, way_out)

@@ -21,10 +21,8 @@ from shellform.run.first_trial import FirstDesign, millimetres
 from shellform.run.sizes import BUILT_OF_SPAN, OF_SPAN, may_come_off, may_stray
 from shellform.surface.shape.target import Surface
 
-_LEFT, _BEGUN = (
-    0.9,
-    0.85,
-)  # of the strength, that rods may be stressed to where the initial design's are to less
+_LEFT = 0.9  # of the rods' strength, that a search may use of a design that begins with `_BEGUN` or less
+_BEGUN = 0.85
 _EVALUATIONS, _POLISHED = 30, 10  # that the case proposed asks for: a first answer in minutes
 
 

@@ -46,8 +46,8 @@ _MORE_RISE = "Give the surface more rise: buckling grows with the square of its 
 
 class Unbuildable(InputError):
     """A surface that no net of the `spacing`, m, covers, or that no rod follows there, for the reason `why`;
-    rounded to the `radius`, m, it may be built, or with the thickness of concrete, m, that it `bears`, if one
-    was found, as the `design` does."""
+    rounded to the `radius`, m, it may be built, or with the thickness of concrete, m, that it `bears`: that
+    of the `design`, if one was found."""
 
     def __init__(
         self,
@@ -58,10 +58,10 @@ class Unbuildable(InputError):
         remedy: str,
         spacing: float,
         radius: float,
-        bears: float | None = None,
         design: FirstDesign | None = None,
     ) -> None:
-        self.why, self.spacing, self.radius, self.bears, self.design = why, spacing, radius, bears, design
+        self.why, self.spacing, self.radius = why, spacing, radius
+        self.design, self.bears = design, None if design is None else design.thickness
         super().__init__(what, where=where, remedy=remedy)
 
     def in_vain(self) -> Unbuildable:
@@ -74,19 +74,16 @@ class Unbuildable(InputError):
             remedy="It takes a rounder form there.",
             spacing=self.spacing,
             radius=self.radius,
-            bears=self.bears,
             design=self.design,
         )
 
 
 class Falls(NotConverged):
     """A shell that its load brings down, or stresses too much, for the reason `what`; `bears`: the thickness
-    of concrete, m, with which it was found to stand, if one was, as the `design` does."""
+    of concrete, m, with which the `design` was found to stand, if one was."""
 
-    def __init__(
-        self, what: str, *, remedy: str, bears: float | None = None, design: FirstDesign | None = None
-    ) -> None:
-        self.bears, self.design = bears, design
+    def __init__(self, what: str, *, remedy: str, design: FirstDesign | None = None) -> None:
+        self.design, self.bears = design, None if design is None else design.thickness
         super().__init__(what, residual=math.nan, iterations=0, remedy=remedy)
 
     def in_vain(self) -> Falls:
@@ -304,15 +301,16 @@ def _fallen(failure: Obstacle, choice: RodChoice, design: FirstDesign | None) ->
         f"where {NEEDED:g} is needed, its {bearing} at {failure.stress:.0%} of {'what they may bear' if failure.why is Why.CABLES else 'their strength'}"
         f"{f', and gives way first{_place(failure)}' if falls else ''}"
     )
-    bears = None if design is None else design.thickness
-    if bears is not None:
+    if design is not None:
         layer = (
             "A single layer of rods bears" if layers_of(choice.section) == 1 else "Rods in two layers bear"
         )
-        remedy = f"{layer} --thickness {bears:g}: pour that first, and the rest when it has hardened."
+        remedy = (
+            f"{layer} --thickness {design.thickness:g}: pour that first, and the rest when it has hardened."
+        )
     else:
         remedy = _MORE_RISE
-    return Falls(what, remedy=remedy, bears=bears, design=design)
+    return Falls(what, remedy=remedy, design=design)
 
 
 def _place(failure: Obstacle) -> str:
@@ -358,7 +356,6 @@ def _crease(
         remedy="Round it there, so that thicker rods follow it.",
         spacing=failure.spacing,
         radius=wanted,
-        bears=None if design is None else design.thickness,
         design=design,
     )
 

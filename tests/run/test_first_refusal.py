@@ -13,6 +13,11 @@ from shellform.run.unbuildable import Falls, Tips, Unbuildable, Why
 STANDS = object()  # a design
 
 
+def bearing(thickness):
+    """A design with so much concrete, m."""
+    return SimpleNamespace(thickness=thickness)
+
+
 def refusal(why):
     return Unbuildable("no", why=why, where="rod", remedy="Round it.", spacing=0.5, radius=2.0)
 
@@ -48,7 +53,7 @@ def test_walls_may_help_what_tips_falls_or_breaks_where_beams_carry_its_outer_ed
         (refusal(Why.STRENGTH), "gfrp_rods", False),  # to leave the rods out is another way
         (Tips("tips", where="edges", remedy="Bring it down."), None, False),
         (NotConverged("falls", remedy="Give it a rise."), None, False),
-        (Falls("falls", remedy="Rods bear --thickness 0.02.", bears=0.02), None, False),
+        (Falls("falls", remedy="Rods bear --thickness 0.02.", design=bearing(0.02)), None, False),
     ],
 )
 def test_a_way_out_stands_instead_of_a_radius_that_nobody_tried_and_beside_other_remedies(
@@ -139,7 +144,8 @@ def test_of_a_shell_that_falls_the_layer_that_stood_is_tried_from_the_start_befo
 
     monkeypatch.setattr(first_refusal, "standing_design", search)
     monkeypatch.setattr(first_refusal, "stretches_of", lambda surface: [])
-    falls = Falls("falls", remedy="Rods bear --thickness 0.009.", bears=0.009)
+    known = bearing(0.009) if work else None
+    falls = Falls("falls", remedy="Rods bear --thickness 0.009.", design=known)
     whole = first_refusal.Allowance(work)
     found = first_refusal.with_ways_out(
         falls, None, DesignWish(thickness=asked), tmp_path / "a.toml", lambda text: None, whole
@@ -169,7 +175,8 @@ def test_what_was_found_to_stand_with_less_concrete_is_the_way_out_where_the_wor
 
     monkeypatch.setattr(first_refusal, "standing_design", search)
     monkeypatch.setattr(first_refusal, "stretches_of", lambda surface: [])
-    falls = Falls("falls", remedy="Rods bear --thickness 0.013.", bears=0.013, design=STANDS)
+    known = bearing(0.013)
+    falls = Falls("falls", remedy="Rods bear --thickness 0.013.", design=known)
     takes = {}
     for work, takes["work"], goes_on in ((0, 0, True), (1000, 900, True), (1000, 100, False)):
         found = first_refusal.with_ways_out(
@@ -177,6 +184,6 @@ def test_what_was_found_to_stand_with_less_concrete_is_the_way_out_where_the_wor
         )
         assert (found.way_out is not None) is goes_on, "with work left it was looked for in vain"
         if goes_on:
-            assert found.way_out.design is STANDS
+            assert found.way_out.design is known
             assert found.way_out.wish.thickness == 0.013
             assert found.offered.remedy.startswith("With --thickness 0.013 this goes on")

@@ -375,7 +375,13 @@ def test_what_falls_or_breaks_under_its_load_is_refused_with_what_stands(
 
 def test_a_refusal_keeps_its_amounts_where_no_way_out_helped():
     told = Unbuildable(
-        "is bent", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.234, bears=0.02
+        "is bent",
+        why=Why.NET,
+        where="net",
+        remedy="Round it.",
+        spacing=0.4,
+        radius=1.234,
+        design=SimpleNamespace(thickness=0.02),
     )
     other = told.in_vain()
     assert other.what.startswith("is bent; no surface near it that is rounded there to 1.2 m or more")

@@ -224,7 +224,13 @@ def test_where_no_rounded_surface_helps_a_first_layer_of_concrete_is_offered_if_
 
     monkeypatch.setattr(first_refusal, "standing_design", search)
     refusal = Unbuildable(
-        "no", why=Why.CURVATURE, where="rod", remedy="Round it.", spacing=0.8, radius=2.0, bears=0.012
+        "no",
+        why=Why.CURVATURE,
+        where="rod",
+        remedy="Round it.",
+        spacing=0.8,
+        radius=2.0,
+        design=SimpleNamespace(thickness=0.012),
     )
     told = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", lambda text: None
