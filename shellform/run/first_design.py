@@ -125,14 +125,11 @@ def finished_design(
     found = straighter(design, surface, search.with_edges, allowance)
     if too_far(found, surface):
         found = nearer(found, surface, search.stiffer, search.other, allowance, search.say)
-        found = replace(found, told=tuple(search.told))
     found = with_strays(with_room(found, surface, search.say), surface)
     if strays(found, surface):
         found = steadier(found, surface, search.stiffer, search.other, allowance, search.say)
-        found = replace(found, told=tuple(search.told))
-    before = len(search.told)
     found = raisable(found, surface, search.thinner, search.other, allowance, search.say)
-    return found if len(search.told) == before else replace(found, told=tuple(search.told))
+    return replace(found, told=tuple(search.told))
 
 
 class _Search:

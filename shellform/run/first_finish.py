@@ -159,7 +159,7 @@ def with_stiffer_rods(design: FirstDesign, stiffer: Stiffer, times: float) -> It
 
 def with_room(design: FirstDesign, surface: Surface, say: Say) -> FirstDesign:
     """The design with thicker strands, as it is where it doesn't stand with them or there are none; what came
-    of it is told to `say`, and with the design."""
+    of it is told to `say`."""
     rope = thicker(design.parts.rope, _ROOM)
     if rope is None:
         return design
@@ -168,12 +168,10 @@ def with_room(design: FirstDesign, surface: Surface, say: Say) -> FirstDesign:
     drawn = None if fails_by(tried) is not None else drawn_standing(net, surface, parts, thickness)
     what = f"strands of {1e3 * rope.diameter:g} mm instead of {1e3 * design.parts.rope.diameter:g}, for the search"
     if drawn is None or drawn.falls:
-        told = f"{what}: {came_to(design.placed, tried)}; not all drawn structures stand, and they are left"
-        say(told)
-        return replace(design, told=(*design.told, told))
-    told = f"{what}: {came_to(design.placed, tried)}; {drawn.standing} of {DRAWN} drawn structures stand"
-    say(told)
-    return replace(design, parts=parts, tried=tried, told=(*design.told, told))
+        say(f"{what}: {came_to(design.placed, tried)}; not all drawn structures stand, and they are left")
+        return design
+    say(f"{what}: {came_to(design.placed, tried)}; {drawn.standing} of {DRAWN} drawn structures stand")
+    return replace(design, parts=parts, tried=tried)
 
 
 def made_of(placed: Placed, parts: FirstParts, thickness: float) -> str:
