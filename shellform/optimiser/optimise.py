@@ -185,7 +185,8 @@ def polish(
     doesn't bear the loads.
     """
     require_count(evaluations, where="evaluations", give="a number of designs to try, such as 20")
-    found = _polished(best, solver, evaluations, groups, progress, judging)
+    least = solver.stiffness * best.stiffness  # in each round: what one may use up the next may not again
+    found = _polished(best, solver, least, evaluations, groups, progress, judging)
     if groups is not None or found.design is best.design:
         return found
     while found.mind and found.objective < worse(found.objective_start, -_AGAIN):
@@ -193,11 +194,19 @@ def polish(
         if spent >= evaluations:
             break
         watch = None if progress is None else partial(_tell_later, progress, spent)
-        more = _polished(found, solver, evaluations - spent, None, watch, judging)
+        more = _polished(found, solver, least, evaluations - spent, None, watch, judging)
         if more.design is found.design or _farthest(more) > max(_farthest(found), solver.deviation or 0.0):
             break
         history = (*found.history, *(_later(step, spent) for step in more.history))
-        found = replace(more, history=history, evaluations=spent + more.evaluations)
+        found = replace(
+            more,
+            history=history,
+            evaluations=spent + more.evaluations,
+            rejected=found.rejected + more.rejected,
+            equilibria=found.equilibria + more.equilibria,
+            factorisations=found.factorisations + more.factorisations,
+            wasted=found.wasted + more.wasted,
+        )
     return found
 
 
@@ -213,12 +222,13 @@ def _tell_later(watch: Watch, spent: int, step: Step) -> None:
 def _polished(
     best: Optimum,
     solver: SequentialConvex,
+    least: float,
     evaluations: int,
     groups: Indices | None,
     progress: Watch | None,
     judging: Judging | None,
 ) -> Optimum:
-    """Polished once."""
+    """Polished once; the softest modes keep a stiffness of `least`, N/m."""
     if groups is not None:
         lengths = averaged(best.design.rest_length, groups, best.design.present)
         best = replace(best, design=replace(best.design, rest_length=lengths))
@@ -236,7 +246,7 @@ def _polished(
             problem,
             best.design,
             solver,
-            lambda _: solver.stiffness * best.stiffness,
+            lambda _: least,
             evaluations,
             progress=progress,
             asked=asked,

@@ -142,7 +142,7 @@ def test_with_structures_in_mind_polishing_goes_on_from_where_it_ended(found, mo
     best = replace(found[0], mind={0: 1.0})
     asked, told = [], []
 
-    def once(before, solver, evaluations, groups, progress, judging):
+    def once(before, solver, least, evaluations, groups, progress, judging):
         asked.append((before, evaluations))
         if progress is not None:
             progress(replace(before.history[0], evaluation=2))

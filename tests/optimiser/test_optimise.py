@@ -143,10 +143,11 @@ def step(evaluation):
 @pytest.fixture
 def rounds(monkeypatch):
     """Rounds of polishing with told ends; how each was begun is kept."""
-    told = SimpleNamespace(ends=[], asked=[])
+    told = SimpleNamespace(ends=[], asked=[], least=[])
 
-    def polished(best, solver, evaluations, groups, progress, judging):
+    def polished(best, solver, least, evaluations, groups, progress, judging):
         told.asked.append((best.status, evaluations))
+        told.least.append(least)
         if progress is not None:
             progress(step(2))
         return told.ends.pop(0)
@@ -165,6 +166,11 @@ def ended(status, objective, evaluations=5, design=None, mind=True):
         design=design,
         history=(step(1), step(evaluations)),
         mind={3: 1.0} if mind else {},
+        stiffness=0.5,
+        rejected=1,
+        equilibria=10,
+        factorisations=100,
+        wasted=20,
     )
 
 
@@ -176,6 +182,13 @@ def test_polishing_goes_on_from_where_it_ended_while_a_round_gains_a_hundredth(r
     assert (found.status, found.objective, found.evaluations) == ("three", 0.995, 18)
     assert [each.evaluation for each in found.history] == [1, 8, 9, 15, 16, 18]
     assert [each.evaluation for each in heard] == [2, 10, 17]
+    assert (found.rejected, found.equilibria, found.factorisations, found.wasted) == (3, 30, 300, 60)
+
+
+def test_what_one_round_of_polishing_uses_up_of_the_stiffness_no_other_may_use_up_again(rounds):
+    rounds.ends = [ended("one", 0.9), ended("two", 0.7), ended("three", 0.6)]
+    sf.polish(optimum_of(stiffness=2.0), solver=replace(POLISHING, stiffness=0.8), evaluations=15)
+    assert rounds.least == [1.6, 1.6, 1.6]
 
 
 def test_another_round_follows_only_with_structures_in_mind_evaluations_left_and_no_groups(rounds):
@@ -247,7 +260,7 @@ class Held(SimpleNamespace):
 
 
 def polished_once(polishing, best, **how):
-    return module._polished(best, POLISHING, 6, how.get("groups"), None, None)
+    return module._polished(best, POLISHING, 0.4, 6, how.get("groups"), None, None)
 
 
 @pytest.mark.parametrize(
@@ -278,7 +291,7 @@ def test_a_polished_design_is_taken_that_stands_is_better_and_has_all_its_cables
     assert grouped is polishing.end, "of averaged lengths"
 
 
-def test_polishing_varies_lengths_alone_where_they_are_variables_and_keeps_four_fifths_of_the_stiffness(
+def test_polishing_varies_lengths_alone_where_they_are_variables_and_keeps_the_stiffness_asked_for(
     polishing,
 ):
     polishing.end = optimum_of(objective=0.9)
