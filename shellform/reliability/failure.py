@@ -21,10 +21,8 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import built_cables, errors_of, variables
 from shellform.reliability.path_of_one import Limit
 from shellform.reliability.standing import Workshop
-from shellform.structure.answers.stability import modes
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import side_by_side
-from shellform.structure.network import assemble
 
 _RESOLUTION = 1 / 1024  # of the load: what most causes bring is less than what a count has to know
 _MOST = 1.5  # load factor up to which a structure without one cause is followed
@@ -37,7 +35,8 @@ class Failure(Record):
     - `number` under its seed; `factor` of the load at which it fell; `kind`: by what (path_of_one.py).
     - `without`: by cause, the load factor that it reaches with that one left out, the most helpful first.
     - `cables`: numbers of those of the design's cables that have gone slack.
-    - `state`: its last one; `mode` (n, 6), largest translation 1: the shape in which it gives way from there.
+    - `state`: its last one; `mode` (n, 6), largest translation 1: its own softest there, in which it gives
+      way.
     """
 
     number: int
@@ -77,7 +76,6 @@ def explained(workshop: Workshop, tolerances: Tolerances, *, seed: int, number: 
         return workshop.fall(own, most=_MOST, resolution=_RESOLUTION, tell=False)
 
     found = {cause: each.factor for cause, each in zip(active, side_by_side(left, active), strict=True)}
-    assembly = assemble(nominal.network)
     cables = nominal.network.cables
     built = built_cables(cables, nominal.present, errors, nominal.imperfections)
     nearest = int(np.argmin(np.abs(nominal.factors - end.factor)))
@@ -88,6 +86,6 @@ def explained(workshop: Workshop, tolerances: Tolerances, *, seed: int, number: 
         end.kind,
         dict(sorted(found.items(), key=lambda each: -each[1])),
         np.flatnonzero(slack),
-        modes(assembly, end.state, 1).shapes[0],
+        workshop.with_structure(errors, lambda own: own.softest(end.state)),
         end.state,
     )

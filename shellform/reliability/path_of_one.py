@@ -251,12 +251,16 @@ class Loading(Branch):
     def kind(self, here: Here) -> str:
         """What ends the branch just beyond the state: at a limit point the path's tangent turns into the
         softest mode, at a bifurcation it stays across."""
-        soft = modes(self.assembly, here.state, 1).shapes[0].ravel()[self.assembly.free]
+        soft = self.softest(here.state).ravel()[self.assembly.free]
         factor = self.assembly.factor(here.state)
         onward = factor.solve(self.load.ravel()[self.assembly.free])
         mass = self.measure.mass_shape
         size = np.sqrt(float((mass * soft * soft).sum() * (mass * onward * onward).sum()))
         return LIMIT_POINT if abs(float((mass * soft * onward).sum())) > _ALIGNED * size else BIFURCATION
+
+    def softest(self, state: State) -> Reals:
+        """The structure's own softest mode in a state (n, 6), the largest translation 1."""
+        return modes(self.assembly, state, 1).shapes[0]
 
     def _unloaded(self) -> Here | None:
         """The unloaded state: supports and free nodes go along with all errors at once, by the perfect

@@ -9,15 +9,18 @@ import pytest
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability import refinement
+from shellform.reliability.drawing import draw_errors
 from shellform.reliability.failure import explained
 from shellform.reliability.path_of_one import BIFURCATION, BORNE, LIMIT_POINT, Snap
 from shellform.reliability.perfect import perfect, perfect_of
 from shellform.reliability.refinement import critical_factor, critical_of, mesh_error, rods_halved
 from shellform.reliability.standing import Workshop
 from shellform.structure.answers.halved import Refined
+from shellform.structure.answers.stability import modes
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import at_rest
 from shellform.structure.model import Model
+from shellform.structure.solve.residual import ResidualNorm
 from shellform.verification import exact
 from shellform.verification.buckling import braced_column
 from shellform.verification.models import PIN, chain, in_plane, line, load_at
@@ -153,6 +156,27 @@ def test_a_fallen_structure_is_explained_by_what_it_would_bear_without_each_caus
     assert set(found.without) == {name for name, value in vars(LARGE).items() if value}
     assert found.without[found.driver] == max(found.without.values()) > found.factor
     assert np.abs(found.mode[:, :3]).max() == pytest.approx(1.0)
+
+
+def test_a_fallen_structure_gives_way_in_the_softest_mode_of_its_own_tangent(dome, nominal):
+    """That of the perfect structure in its state is stressed by all errors: its softest is −3e4 N/m."""
+    workshop = Workshop(perfect(dome, dome.design(), 1.2 * nominal.load))
+    outcomes = workshop.load_numbers(LARGE, seed=7, numbers=range(12))
+    number = next(each.number for each in outcomes if not each.stands and each.factor > 0.0)
+    found = explained(workshop, LARGE, seed=7, number=number)
+
+    def stiffness(own):
+        held = own.assembly.free
+        shape = found.mode.ravel()[held]
+        tangent = own.assembly.matrix.full(own.assembly.evaluate(found.state).tangent)
+        mass = ResidualNorm(own.assembly).mass_shape
+        softest = modes(own.assembly, found.state, 1).stiffness[0]
+        return float(shape @ (tangent @ shape) / (mass * shape * shape).sum()), softest
+
+    errors = draw_errors(workshop.nominal.members, LARGE, 7, number)
+    own, softest = workshop.with_structure(errors, stiffness)
+    assert own == pytest.approx(softest, rel=1e-3, abs=1e-3)
+    assert 0.0 < own < 10.0
 
 
 def test_a_structure_that_stands_has_no_failure_to_explain(nominal):
