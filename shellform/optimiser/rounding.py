@@ -65,15 +65,16 @@ def tried(
     evaluations: int,
     beside: int,
     solver: SequentialConvex | MovingAsymptotes | None = None,
+    safety: Safety | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[CandidateSection]:
     """The section next above the optimum's radius and `beside` of them below and above, by rising stiffness,
     each with its cables optimised.
 
     `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed
-    section; `solver` is what made the optimum. The stiffness that the optimum kept, as far as a section has
-    it at all, and what was asked of it as built are asked of each. Raises InputError where no section that
-    the net allows is stiff enough.
+    section; `solver` and `safety` are those by which the optimum was made. The stiffness that the optimum
+    kept, as far as a section has it at all, is asked of each. Raises InputError where no section that the net
+    allows is stiff enough.
     """
     shell = best.problem.shell
     needed = {best.problem.design_load.name, *(share.term.load for share in best.problem.minimise)} - {""}
@@ -90,7 +91,7 @@ def tried(
             best.stiffness,
             evaluations,
             solver or SequentialConvex(),
-            None if best.asked is None else best.asked.trial.safety,
+            safety,
         )
         found.append(_candidate(name, other, optimum, why, weights, best.problem, other.rod.section == up))
     return found

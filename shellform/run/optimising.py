@@ -309,6 +309,7 @@ def _rounded(
         evaluations=entry.rounded,
         beside=entry.neighbours,
         solver=_solver(workspace.case),
+        safety=case_safety(workspace.case, best.problem.shell),
         progress=lambda text: workspace.say("optimise", text),
     )
     sections = tuple(_section(each) for each in trials)

@@ -10,7 +10,7 @@ import pytest
 
 import shellform as sf
 from shellform.case.build_problem import case_problem, varied
-from shellform.case.build_safety import case_tolerances
+from shellform.case.build_safety import case_safety, case_tolerances
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.reactions import reactions
@@ -335,7 +335,17 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
     )
 
 
-def test_a_free_radius_is_rounded_up_and_the_neighbouring_sections_are_tried(tmp_path):
+def test_a_free_radius_is_rounded_up_and_the_neighbouring_sections_are_tried_as_safe_as_is_asked(
+    tmp_path, monkeypatch
+):
+    """By the case's own safety: what the search before came to ask of its trials says nothing of these."""
+    searched, search = [], rounding.optimise
+
+    def searching(*given, safety, **how):
+        searched.append(safety)
+        return search(*given, safety=safety, **how)
+
+    monkeypatch.setattr(rounding, "optimise", searching)
     settings = [*SMALL, "optimise.evaluations=5", "optimise.rounded=2", "optimise.polish=0"]
     settings += ["joint.gap=0.0045", "optimise.unloaded=false", "cable.without=false"]
     settings += ["safety.drawn=4", "safety.compared=2"]
@@ -357,6 +367,8 @@ def test_a_free_radius_is_rounded_up_and_the_neighbouring_sections_are_tried(tmp
     for each in sections:
         assert each.feasible == (not each.why_not)
     run = read_run(tmp_path)
+    asked = case_safety(case, run.shell)
+    assert {(each.enlarged, each.tried) for each in searched} == {(asked.enlarged, asked.tried)}
     assert run.best == "rounded"
     assert run.shell_of("rounded").rod.radius == designs["rounded"].rod_radius
     # Another case in the same folder leaves nothing of this one behind.

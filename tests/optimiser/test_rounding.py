@@ -209,8 +209,7 @@ def test_stiffness_is_asked_for_as_a_share_of_the_start_s_at_most_all_of_it(
 
 
 def test_sections_beside_the_free_radius_are_tried_each_from_its_own_design_and_from_all_cables(monkeypatch):
-    """Loads that no term is taken at aren't followed for the weights; the safety asked of the optimum is
-    asked of each."""
+    """Loads that no term is taken at aren't followed for the weights; of each the safety is asked."""
     sections = {name: SimpleNamespace(rod=SimpleNamespace(section=name)) for name in ("thin", "up", "thick")}
     own = {
         name: Design(np.full(2, k + 1.0), np.array([True, False]), 0.01 * (k + 1))
@@ -225,7 +224,6 @@ def test_sections_beside_the_free_radius_are_tried_each_from_its_own_design_and_
         ),
         design="free",
         stiffness=0.7,
-        asked=SimpleNamespace(trial=SimpleNamespace(safety="safety")),
     )
     start, seen, heard = Design(np.full(2, 9.0), np.array([True, True]), 0.5), [], []
 
@@ -255,6 +253,7 @@ def test_sections_beside_the_free_radius_are_tried_each_from_its_own_design_and_
         lambda shell: ("problem", shell),
         evaluations=30,
         beside=1,
+        safety="safety",
         progress=heard.append,
     )
     assert seen[0] == ({"wet": 1, "wetter": 2}, True)
@@ -271,7 +270,7 @@ def test_sections_beside_the_free_radius_are_tried_each_from_its_own_design_and_
         0.02,
     )
     assert rest == [0.7, 30, sf.SequentialConvex(), "safety"]
-    best.asked, best.problem.minimise = None, best.problem.minimise[:1]
+    best.problem.minimise = best.problem.minimise[:1]
     rounding.tried(best, start, "catalogue", lambda shell: shell, evaluations=30, beside=1, solver="mine")
     assert seen[4] == ({"wet": 1}, False)
     assert seen[5][-2:] == ("mine", None)
