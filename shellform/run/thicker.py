@@ -20,8 +20,7 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.records.as_built import AsBuilt
 from shellform.records.remedies import rounded_up
 from shellform.records.thicker_rods import ThickerRodsRecord
-from shellform.reliability.safety import allowed, paths
-from shellform.reliability.standing import sample
+from shellform.reliability.safety import Safety, judge
 
 DRAWN = 40  # structures of each size of rods
 _THICKER = 1.1  # times as thick as the ones before
@@ -40,12 +39,17 @@ def rods_that_stand(
     catalogue: Catalogue | None = None,
 ) -> ThickerRodsRecord | None:
     """The thinnest of the thicker rods, or the least stiff section of the `catalogue`, with which the
-    `initial` design stands as often as is `asked` under every load; None where none does that the net
-    allows."""
+    `initial` design stands as often as is `asked` under every load (as under the design load, where nothing
+    else is); None where none does that the net allows."""
+    safety = Safety(tolerances, asked.design, asked.other, critical_factor=None, drawn=DRAWN, seed=seed)
     for name, other, design in _thicker(shell, initial, catalogue):
-        standing = _standing(other, design, loads, tolerances, seed)
-        if DRAWN - standing <= allowed(asked.design, DRAWN):
-            return ThickerRodsRecord(design.radius, standing, DRAWN, name)
+        try:
+            found = judge(other, design, loads, safety)
+        except NotConverged:
+            continue  # without an unloaded state none stands
+        if not found.failed:
+            fewest = min(each.standing.standing for each in found.loads.values())
+            return ThickerRodsRecord(design.radius, fewest, DRAWN, name)
     return None
 
 
@@ -70,18 +74,3 @@ def _thicker(
 
 def _stiffer(one: Gridshell, other: Gridshell) -> bool:
     return min(one.rod.stiffness.bending) > (1.0 + _EQUAL) * min(other.rod.stiffness.bending)
-
-
-def _standing(
-    shell: Gridshell, design: Design, loads: Mapping[str, Reals], tolerances: Tolerances, seed: int
-) -> int:
-    """How many structures stand under every load, the least of them; the largest of those on one path is the
-    hardest."""
-    try:
-        found = [
-            sample(shell, design, loads[largest], tolerances, count=DRAWN, seed=seed).standing.standing
-            for largest in paths(loads)
-        ]
-    except NotConverged:
-        return 0  # without an unloaded state none stands
-    return min(found, default=DRAWN)

@@ -1,7 +1,6 @@
 """Which rods stand where the given ones don't."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -108,12 +107,12 @@ def test_remedies_name_the_entries_that_the_case_has():
     assert "rod.radius = 0.018, rod.wall = 0.0018" in RodsOf(0.02, 0.05, 1.0, sizes=sizes).thinner(0.9)
 
 
-def test_rods_stand_as_often_as_under_the_load_under_which_the_fewest_do(monkeypatch):
-    stood = {1.0: 30, 2.0: 20, 3.0: 25}
-
-    def counted(shell, design, load, *arguments, **settings):
-        return SimpleNamespace(standing=SimpleNamespace(standing=stood[load[0, 0]]))
-
-    monkeypatch.setattr(thicker, "sample", counted)
-    loads = {name: np.array([row]) for name, row in (("a", [1.0, 9.0]), ("b", [2.0, 0.0]), ("c", [3.0, 1.0]))}
-    assert thicker._standing(None, None, loads, None, 0) == 20
+def test_under_a_further_load_as_many_have_to_stand_as_are_asked_for_under_it(dome):
+    """Under 1.2 × the load half of the structures, with thinner rods than where all have to."""
+    load = dome.point_load(7.8, every=2)
+    loads = {"design": load / 1.2, "additional": load}
+    half = rods_that_stand(dome, dome.design(), loads, AS_BUILT, replace(ASKED, other=0.5), seed=3)
+    every = rods_that_stand(dome, dome.design(), loads, AS_BUILT, ASKED, seed=3)
+    assert half.radius < every.radius
+    assert DRAWN / 2 <= half.standing == standing(dome, half.radius, load) < every.standing == DRAWN
+    assert standing(dome, half.radius, load / 1.2) == DRAWN

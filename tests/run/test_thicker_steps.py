@@ -9,7 +9,10 @@ import pytest
 import shellform as sf
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
+from shellform.gridshell.tolerances import Tolerances
 from shellform.records.as_built import AsBuilt
+from shellform.reliability.probability import counted
+from shellform.reliability.safety import Judgement, UnderLoad
 from shellform.run import thicker
 from shellform.structure.elements.sections import BeamStiffness
 
@@ -18,15 +21,32 @@ FIRST = Design(np.array([1.0]), np.array([True]), 0.01)
 ASKED = AsBuilt(0.95, None, 200)
 
 
-@pytest.mark.parametrize(("stand", "at"), [((10, 37, 38, 40), 2), ((38, 40), 0), ((37, 37), None)])
+LOADS = {"design": np.ones((1, 6))}
+
+
+@pytest.mark.parametrize(
+    ("stand", "at"), [((10, 37, 38, 40), 2), ((38, 40), 0), ((37, 37), None), ((None, 40), 1)]
+)
 def test_of_thicker_rods_the_first_are_named_of_which_no_more_fall_than_may(monkeypatch, stand, at):
-    """Of 40 two, where 0.95 are to stand."""
-    tried = [("name", "shell", replace(FIRST, radius=0.011 + 0.001 * k)) for k in range(len(stand))]
+    """Of 40 two, where 0.95 are to stand; where there is no unloaded state (None) none stands."""
+    tried = [(f"name {k}", "shell", replace(FIRST, radius=0.011 + 0.001 * k)) for k in range(len(stand))]
     monkeypatch.setattr(thicker, "_thicker", lambda *_: iter(tried))
-    monkeypatch.setattr(
-        thicker, "_standing", lambda shell, own, *_: stand[round((own.radius - 0.011) / 0.001)]
-    )
-    found = thicker.rods_that_stand(None, FIRST, {}, None, ASKED, seed=1)
+    asked = []
+
+    def judged(shell, design, loads, safety):
+        count = stand[round((design.radius - 0.011) / 0.001)]
+        if count is None:
+            raise NotConverged("there is none")
+        asked.append(
+            (loads, safety.probability_design, safety.probability_additional, safety.critical_factor)
+        )
+        fallen = tuple(range(safety.drawn - count))
+        under = UnderLoad(counted(safety.drawn, count, seed=1), safety.probability_design, fallen)
+        return Judgement({"design": under}, None, () if under.holds else ("falls",))
+
+    monkeypatch.setattr(thicker, "judge", judged)
+    found = thicker.rods_that_stand(None, FIRST, LOADS, Tolerances(), ASKED, seed=1)
+    assert asked[0] == (LOADS, 0.95, None, None)
     if at is None:
         assert found is None
         return
@@ -34,7 +54,7 @@ def test_of_thicker_rods_the_first_are_named_of_which_no_more_fall_than_may(monk
         tried[at][2].radius,
         stand[at],
         40,
-        "name",
+        f"name {at}",
     )
 
 
@@ -53,12 +73,3 @@ def test_a_section_is_stiffer_that_bends_less_easily_in_its_softer_direction():
     assert thicker._stiffer(rod(5.0, 3.0), rod(9.0, 2.0))
     assert not thicker._stiffer(rod(5.0, 3.0), rod(3.0, 3.0))
     assert not thicker._stiffer(rod(9.0, 1.9), rod(2.0, 2.0))
-
-
-def test_where_there_is_no_unloaded_state_none_stands_and_under_no_load_all_do(monkeypatch):
-    def lost(*_, **__):
-        raise NotConverged("there is none")
-
-    monkeypatch.setattr(thicker, "sample", lost)
-    assert thicker._standing(None, None, {"a": np.ones((1, 6))}, None, 1) == 0
-    assert thicker._standing(None, None, {"a": np.zeros((1, 6))}, None, 1) == 40
