@@ -137,10 +137,16 @@ def members_of(shell: Gridshell) -> Members:
 
 
 def zones_of(shell: Gridshell) -> Indices:
-    """The crossing (n,) that each node's load is counted to: the nearest in the flat grid."""
-    grid = shell.net.grid
+    """The crossing (n,) that each node's load is counted to: the nearest in the flat grid; of an edge beam's
+    nodes, which have no place in it, the nearest in the target."""
+    grid, places = shell.net.grid, shell.target.positions
     middle = grid.flat[grid.crossing_nodes].mean(axis=1)[:, :2]
-    return np.asarray(cKDTree(middle).query(grid.flat[:, :2])[1], dtype=np.int64)
+    found = cKDTree(middle).query(grid.flat[:, :2])[1]
+    on_rods = np.concatenate([rod.nodes for rod in grid.rods])
+    beside = np.setdiff1d(np.arange(len(places)), on_rods)
+    if len(beside):
+        found[beside] = cKDTree(places[grid.crossing_nodes].mean(axis=1)).query(places[beside])[1]
+    return np.asarray(found, dtype=np.int64)
 
 
 def members_of_model(model: Model) -> Members:

@@ -1,5 +1,7 @@
 """Drawn structures of shells whose edges hang on edge beams."""
 
+from dataclasses import replace
+
 import numpy as np
 
 import shellform as sf
@@ -7,7 +9,7 @@ from shellform.gridshell.edge_beams import Bundle, EdgeBeam
 from shellform.gridshell.tolerances import Tolerances, default_tolerances
 from shellform.net.edges import stand
 from shellform.reliability.drawing import errors_of, variables
-from shellform.reliability.members import members_of
+from shellform.reliability.members import members_of, zones_of
 from shellform.reliability.standing import sample
 from shellform.structure.elements.sections import isotropic
 from shellform.structure.network import assemble
@@ -18,8 +20,10 @@ from tests.net.edge_shells import barrel
 GFRP = EdgeBeam(Bundle(0.0012, 19, 0.5, isotropic(young=40e9, density=2000.0, strength=600e6)))
 
 
-def arches(edge=GFRP):
+def arches(edge=GFRP, moved=0.0):
     surface = barrel()
+    if moved:
+        surface = replace(surface, vertices=surface.vertices + np.array([moved, 0.0, 0.0]))
     net = stand(sf.pull_net(surface, spacing=0.1, gap=0.0024, angle=np.deg2rad(45.0), elements=2), surface)
     rod = sf.Rod.round(young=40e9, radius=0.0012, strength=600e6, density=2000.0)
     joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.0024)
@@ -42,6 +46,20 @@ def test_edge_beams_are_drawn_without_error_and_the_structures_stand_or_fall_as_
     assert exact.far < 1e-6
     drawn = sample(shell, shell.design(), load, default_tolerances(shell), count=2, seed=0)
     assert all(each.far > 1e-5 for each in drawn.outcomes)
+
+
+def test_edge_beams_weigh_on_the_crossings_beside_them_wherever_the_surface_lies():
+    near, far = arches(), arches(moved=3.0)
+    own = zones_of(near)
+    np.testing.assert_array_equal(own, zones_of(far))
+    crossings = near.net.grid.crossing_nodes
+    beside = np.setdiff1d(
+        np.arange(near.node_count), np.concatenate([rod.nodes for rod in near.net.grid.rods])
+    )
+    assert len(beside)
+    middle = near.target.positions[crossings].mean(axis=1)
+    apart = np.linalg.norm(middle[own[beside]] - near.target.positions[beside], axis=1)
+    assert apart.max() < 0.15, "a cell across"
 
 
 def test_edge_beams_whose_last_digits_are_near_what_is_to_be_told_are_loaded_in_double_precision(monkeypatch):

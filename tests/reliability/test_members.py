@@ -120,6 +120,8 @@ def test_a_node_s_load_is_counted_to_the_crossing_that_is_nearest_on_the_flat_gr
             [1.4, 0.5, 9.0],
         ]
     )
-    grid = SimpleNamespace(flat=flat, crossing_nodes=np.array([[0, 1], [2, 3]]))
-    shell = SimpleNamespace(net=SimpleNamespace(grid=grid))
+    rods = [SimpleNamespace(nodes=np.array([0, 2, 4])), SimpleNamespace(nodes=np.array([5, 1, 3]))]
+    grid = SimpleNamespace(flat=flat, rods=rods, crossing_nodes=np.array([[0, 1], [2, 3]]))
+    target = SimpleNamespace(positions=np.zeros((6, 3)))
+    shell = SimpleNamespace(net=SimpleNamespace(grid=grid), target=target)
     assert zones_of(shell).tolist() == [0, 0, 1, 1, 0, 1]
