@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -231,9 +232,17 @@ def _runs(kinds: Sequence[str]) -> list[tuple[int, int]]:
 
 
 def _stretches(rim: Rim) -> list[Stretch]:
+    """The rim's runs of one kind and name; along a curve where the net was cut off from its first point to
+    its last."""
     count = len(rim.points)
     labels = [f"{kind}\n{name}" for kind, name in zip(rim.kinds, rim.names, strict=True)]
     found = []
+    if rim.cut:
+        starts = [0, *(k for k in range(1, count - 1) if labels[k] != labels[k - 1])]
+        for first, last in pairwise([*starts, count - 1]):
+            points = rim.points[first : last + 1]
+            found.append(Stretch(rim.kinds[first], rim.names[first], points, rim.opening, False))
+        return found
     for first, last in _runs(labels):
         whole = last - first + 1 == count
         at = np.arange(first, last + 2) % count  # up to where the next one begins

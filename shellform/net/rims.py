@@ -17,6 +17,7 @@ from shellform.surface.shape.target import Surface
 from shellform.surface.shape.tree import Tree
 
 _OFF = 0.5  # of the spacing: an end farther from the surface's edge was cut off by a level or an outline
+_BACK = 0.5  # of its length: what comes nearer to its beginning goes round
 _APART = 2.5  # of the spacing: where a net was cut off, ends farther from one another are on two edges
 
 
@@ -74,9 +75,14 @@ def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End
             if outline is None
             else nearest(middle[cut, :2], closed(outline))[1]
         )
-        for chain in _chains(cut[np.argsort(key, kind="stable")], middle, _APART * net.grid.scale):
+        apart = _APART * net.grid.scale
+        for chain in _chains(cut[np.argsort(key, kind="stable")], middle, apart):
+            if _goes_round(middle[chain], apart):  # within the surface
+                order |= {int(end): (len(rims), k) for k, end in enumerate(chain)}
+                rims.append(rim_of(middle[chain], False))
+                continue
             order |= {int(end): (len(rims), k) for k, end in enumerate(chain, 1)}
-            feet = _reached(middle[chain[[0, -1]]], rims, _APART * net.grid.scale)
+            feet = _reached(middle[chain[[0, -1]]], rims, apart)
             rims.append(rim_of(np.vstack([feet[:1], middle[chain], feet[1:]]), False, cut=True))
     for k, node in enumerate(nodes.tolist()):
         if k in order:
@@ -128,6 +134,14 @@ def _chains(ends: Indices, middle: Reals, apart: float) -> list[Indices]:
         return [ends]
     turned = np.roll(ends, -(int(gaps[0]) + 1))
     return np.split(turned, np.flatnonzero(np.roll(step, -(int(gaps[0]) + 1))[:-1] > apart) + 1)
+
+
+def _goes_round(points: Reals, apart: float) -> bool:
+    """Whether points (k, 3), m, in order come back to where they begin, to within `apart`, m: those of a few
+    rods that were cut off at a corner lie as near to each other."""
+    between = float(np.linalg.norm(points[-1] - points[0]))
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    return between <= min(apart, _BACK * length)
 
 
 def _reached(points: Reals, rims: Sequence[Rim], apart: float) -> Reals:

@@ -268,6 +268,22 @@ def test_a_net_cut_off_by_an_outline_has_its_edge_along_it():
     for line in beams:
         np.testing.assert_allclose(np.abs(found.target.positions[line.clamps[:, 0], 0]), 0.35, atol=5e-3)
 
+    cut = [each for each in found.stretches if np.ptp(each.points[:, 0]) < 0.1]
+    assert {each.kind for each in cut} == {"beam", "ground"}
+    for side in (-0.35, 0.35):
+        own = [each for each in cut if abs(each.points[0, 0] - side) < 0.1]
+        assert sum(each.length for each in own) == pytest.approx(2.0 * 0.5 * 0.9, rel=0.05), "an arch"
+
+
+def test_a_net_cut_off_by_an_outline_within_its_surface_has_an_edge_all_round():
+    surface, angles = barrel(length=1.2), np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    outline = 0.25 * np.column_stack([np.cos(angles), np.sin(angles)])
+    found = stand(pulled(surface, outline=outline), surface, Edges(outer="wall"), outline=outline)
+    (cut,) = [each for each in found.stretches if np.ptp(each.points[:, 0]) < 0.6]
+    assert cut.whole
+    assert cut.length == pytest.approx(np.linalg.norm(np.diff(cut.points, axis=0), axis=1).sum())
+    np.testing.assert_array_equal(cut.points[0], cut.points[-1])
+
 
 def test_a_net_with_edge_beams_comes_back_from_its_file(tmp_path, vault_of_two_arches):
     surface, net = vault_of_two_arches

@@ -118,6 +118,18 @@ def test_the_ends_of_a_curve_along_which_a_net_was_cut_off_are_no_part_of_a_beam
     assert made.found == [False, True, True, True]
 
 
+def test_the_stretches_of_a_curve_along_which_a_net_was_cut_off_end_with_it():
+    made = sorted_out([0.0, 0.0, 2.0, 2.0, 0.0], cut=True)
+    made.kinds = ["ground", "ground", "beam", "beam", "free"]
+    first, second = module._stretches(made)
+    assert [(each.kind, each.whole) for each in (first, second)] == [("ground", False), ("beam", False)]
+    assert first.points[:, 0].tolist() == [0.0, 1.0, 2.0]
+    assert second.points[:, 0].tolist() == [2.0, 3.0, 4.0], "and not back to its beginning"
+    made.kinds = ["ground"] * 5
+    (one,) = module._stretches(made)
+    assert (one.length, one.whole) == (pytest.approx(2.0 * np.hypot(1.0, 2.0) + 2.0), False)
+
+
 def test_runs_go_round_a_loop_and_the_last_may_lie_past_its_end():
     assert module._runs("aabbba") == [(2, 4), (5, 7)]
     assert module._runs("abc") == [(0, 0), (1, 1), (2, 2)]
