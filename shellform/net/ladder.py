@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from shellform.net.chebyshev import NetSettings, NetTuning, net_at
 from shellform.net.net import Net
@@ -33,8 +33,8 @@ _REACHED = frozenset({Reason.SHORT, Reason.BROKEN})
 @dataclass(frozen=True)
 class Rung:
     """A change and the reasons it may help `against`: the net turned by `turn`, rad, shifted by `shift`
-    spacings, its shear stiffness times `shear`, its springs of the `density` given, EI/s³, begun `flat`, and
-    its `tuning`."""
+    spacings, its shear stiffness times `shear`, its springs of the `density` given, EI/s³, begun `flat`; and
+    what its tuning has in place of the settings' (None: the same)."""
 
     change: Change
     against: frozenset[Reason] = _ANY
@@ -43,29 +43,39 @@ class Rung:
     shear: float = 1.0
     density: tuple[float, ...] = ()
     flat: bool = False
-    tuning: NetTuning = field(default_factory=NetTuning)
+    tail: int | None = None
+    reach: float | None = None
+    tolerance: float | None = None
+
+    def tuned(self, tuning: NetTuning) -> NetTuning:
+        """The tuning with what this rung has in its place."""
+        return NetTuning(
+            limit=tuning.limit,
+            reach=tuning.reach if self.reach is None else self.reach,
+            tolerance=tuning.tolerance if self.tolerance is None else self.tolerance,
+            tail=tuning.tail if self.tail is None else self.tail,
+        )
 
 
-def _turned(degrees: float, tail: int = 0) -> Rung:
-    return Rung(Change.TURNED, turn=math.radians(degrees), tuning=NetTuning(tail=tail))
+def _turned(degrees: float, tail: int | None = None) -> Rung:
+    return Rung(Change.TURNED, turn=math.radians(degrees), tail=tail)
 
 
 LADDER = (
-    Rung(Change.NOTHING, tuning=NetTuning()),
-    Rung(Change.LOOSER, frozenset({Reason.STALLED}), tuning=NetTuning(tolerance=_SETTLED)),
-    Rung(Change.LONGER, _REACHED, tuning=NetTuning(tail=2)),
-    Rung(Change.TIGHTER, frozenset({Reason.OFF}), density=(*FROM_COMPASS, 50.0, 500.0),
-         tuning=NetTuning(tolerance=_SETTLED)),
-    Rung(Change.GENTLER, _PULL, density=FROM_FLAT, tuning=NetTuning(reach=0.5, tolerance=_SETTLED)),
+    Rung(Change.NOTHING),
+    Rung(Change.LOOSER, frozenset({Reason.STALLED}), tolerance=_SETTLED),
+    Rung(Change.LONGER, _REACHED, tail=2),
+    Rung(Change.TIGHTER, frozenset({Reason.OFF}), density=(*FROM_COMPASS, 50.0, 500.0), tolerance=_SETTLED),
+    Rung(Change.GENTLER, _PULL, density=FROM_FLAT, reach=0.5, tolerance=_SETTLED),
     Rung(Change.SHEAR, _PULL, shear=5.0),
     _turned(5.0),
     _turned(-5.0),
     _turned(10.0, 2),
     _turned(-10.0, 2),
     Rung(Change.SHIFTED, shift=(0.5, 0.5)),
-    Rung(Change.SHIFTED, shift=(0.5, 0.0), tuning=NetTuning(tail=2, tolerance=_SETTLED)),
-    Rung(Change.FLAT, _PULL, density=FROM_FLAT, flat=True, tuning=NetTuning(reach=0.5, tolerance=_SETTLED)),
-)  # fmt: skip
+    Rung(Change.SHIFTED, shift=(0.5, 0.0), tail=2, tolerance=_SETTLED),
+    Rung(Change.FLAT, _PULL, density=FROM_FLAT, flat=True, reach=0.5, tolerance=_SETTLED),
+)
 
 
 def climbed_net(
@@ -141,7 +151,7 @@ def _changed(settings: NetSettings, rung: Rung) -> NetSettings:
         shear_stiffness=rung.shear * settings.shear_stiffness,
         spring_density=rung.density or settings.spring_density,
         start="flat" if rung.flat else settings.start,
-        tuning=rung.tuning,
+        tuning=rung.tuned(settings.tuning),
     )
 
 

@@ -68,10 +68,11 @@ def oriented_net(
     workers: int = 2,
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[Net, float, tuple[float, float]]:
-    """The net with the `settings` at the `angle`, rad, and `offset`, or at those that `best_orientation`
-    finds, or the first on the ladder from there; and which these are."""
+    """The net with the `settings` at the `angle`, rad, and `offset`, or at the angle that `best_orientation`
+    finds, with its offset where none is given, or the first on the ladder from there; and which these are."""
     if angle == "auto":
-        best, _ = best_orientation(surface, settings, workers=workers, progress=progress)
+        fixed = offset if any(offset) else None
+        best, _ = best_orientation(surface, settings, offset=fixed, workers=workers, progress=progress)
         angle, offset = best.angle, best.offset
 
     def watch(what: str, residual: float) -> None:
@@ -85,10 +86,12 @@ def best_orientation(
     surface: Surface,
     settings: NetSettings,
     *,
+    offset: tuple[float, float] | None = None,
     workers: int = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[TriedNet, list[TriedNet]]:
-    """The best trial and all of those pulled, the best compass net's where no pull succeeds.
+    """The best trial, at the `offset` (None: the best of four), and all of those pulled, the best compass
+    net's where no pull succeeds.
 
     Raises InputError where no orientation gives a net.
     """
@@ -96,6 +99,7 @@ def best_orientation(
     if settings.spacing_v not in (None, settings.spacing):
         quarter = math.pi  # u and v differ
     angles = [quarter * k / _ANGLES for k in range(_ANGLES)]
+    at = offset or _OFFSETS[0]
     tried: list[TriedNet] = []
     with _runner(surface, settings, workers) as run:
 
@@ -111,7 +115,7 @@ def best_orientation(
             return found
 
         for tail in _TAILS:
-            compass = stage("compass net", [(angle, (0.0, 0.0), "compass", tail) for angle in angles])
+            compass = stage("compass net", [(angle, at, "compass", tail) for angle in angles])
             usable = sorted(
                 (trial for trial in compass if math.isfinite(trial.cost)), key=lambda trial: trial.cost
             )
@@ -124,16 +128,15 @@ def best_orientation(
                 value="auto",
                 remedy="Choose a smaller spacing.",
             )
-        pulled = stage("pulled net", [(trial.angle, (0.0, 0.0), "pull", tail) for trial in usable[:_BEST]])
+        pulled = stage("pulled net", [(trial.angle, at, "pull", tail) for trial in usable[:_BEST]])
         best = min(pulled, key=lambda trial: trial.cost)
         tried += pulled
         # Between the best angle and its neighbours, and with other offsets
         half = 0.5 * quarter / _ANGLES
-        turned = stage(
-            "pulled net", [(best.angle + side * half, (0.0, 0.0), "pull", tail) for side in (-1.0, 1.0)]
-        )
+        turned = stage("pulled net", [(best.angle + side * half, at, "pull", tail) for side in (-1.0, 1.0)])
         best = min([best, *turned], key=lambda trial: trial.cost)
-        shifted = stage("pulled net", [(best.angle, offset, "pull", tail) for offset in _OFFSETS[1:]])
+        others = _OFFSETS[1:] if offset is None else ()
+        shifted = stage("pulled net", [(best.angle, other, "pull", tail) for other in others])
         tried += turned + shifted
         best = min([best, *shifted], key=lambda trial: trial.cost)
     if not math.isfinite(best.cost):

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -196,7 +196,7 @@ def least_bent_net(
     try:
         net, given = climbed_net(
             surface,
-            settings,
+            replace(settings, tuning=NetTuning()),  # as a design climbs it
             angle=math.radians(angles[first]),
             most=left + _taken(failed),
             failed=failed,

@@ -10,7 +10,7 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError, NotConverged
-from shellform.net.chebyshev import NetSettings, net_at
+from shellform.net.chebyshev import NetSettings, NetTuning, net_at
 from shellform.net.ladder import LADDER, Rung, _changed, _vain, climbed_net
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.orientation import oriented_net
@@ -169,6 +169,22 @@ def test_rungs_keep_to_what_was_stated():
     assert not _vain(looser, ANY, Stalled("", residual=1e-6, iterations=1))
     softer, stiffer = (dataclasses.replace(ANY, shear_stiffness=each) for each in (0.2, 1.0))
     assert _changed(softer, dataclasses.replace(Rung(Change.SHEAR), shear=5.0)) == stiffer
+
+
+def test_a_rung_changes_of_the_tuning_that_was_given_what_it_names_alone():
+    own = NetTuning(limit=110, tail=3, tolerance=1e-4, reach=0.7)
+    given = dataclasses.replace(ANY, tuning=own)
+    assert _changed(given, LADDER[0]) == given
+    changed = {
+        rung.change: _changed(given, rung).tuning for rung in LADDER if rung.change is not Change.SHIFTED
+    }
+    assert changed[Change.LONGER] == dataclasses.replace(own, tail=2)
+    assert changed[Change.SHEAR] == own
+    assert (changed[Change.FLAT].reach, changed[Change.FLAT].limit, changed[Change.FLAT].tail) == (
+        0.5,
+        110,
+        3,
+    )
 
 
 def test_a_relaxation_that_comes_no_nearer_is_ended_early_but_not_one_on_its_way():

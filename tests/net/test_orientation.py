@@ -27,7 +27,7 @@ def test_the_cost_is_the_mean_energy_of_a_segment_and_its_joint():
     assert cost(net) == pytest.approx(0.5 * 0.14 * 0.25 + 0.5 * 0.1 * 0.05)
 
 
-def searched(monkeypatch, price, settings=None):
+def searched(monkeypatch, price, settings=None, offset=None):
     """The best trial and the jobs that were asked for, stage by stage; a job costs what `price` says."""
     stages = []
 
@@ -43,7 +43,7 @@ def searched(monkeypatch, price, settings=None):
         yield run
 
     monkeypatch.setattr(orientation, "_runner", runner)
-    best, tried = best_orientation(None, settings or SETTINGS)
+    best, tried = best_orientation(None, settings or SETTINGS, offset=offset)
     return best, tried, stages
 
 
@@ -104,6 +104,12 @@ def test_a_pulled_net_that_no_turn_and_no_shift_betters_is_the_best(monkeypatch)
     assert best.offset == (0.0, 0.0)
 
 
+def test_with_an_offset_that_is_given_the_angle_alone_is_sought(monkeypatch):
+    best, _, stages = searched(monkeypatch, lambda angle, *_: abs(angle - 0.3), offset=(0.3, 0.2))
+    assert {job[1] for stage in stages for job in stage} == {(0.3, 0.2)} == {best.offset}
+    assert [len(stage) for stage in stages] == [12, 4, 2, 0]
+
+
 def test_an_angle_that_is_left_open_is_that_of_the_search_and_one_given_is_kept(monkeypatch):
     asked = []
 
@@ -112,10 +118,17 @@ def test_an_angle_that_is_left_open_is_that_of_the_search_and_one_given_is_kept(
         return "net", SimpleNamespace(angle=angle + 1.0, offset=offset)
 
     monkeypatch.setattr(orientation, "climbed_net", climbed)
-    monkeypatch.setattr(
-        orientation, "best_orientation", lambda *_, **__: (TriedNet(0.3, (0.5, 0.0), 1.0), [])
-    )
+    sought = []
+
+    def best(_surface, _settings, *, offset, **_how):
+        sought.append(offset)
+        return TriedNet(0.3, offset or (0.5, 0.0), 1.0), []
+
+    monkeypatch.setattr(orientation, "best_orientation", best)
     assert oriented_net(None, SETTINGS, angle="auto") == ("net", 1.3, (0.5, 0.0))
+    assert oriented_net(None, SETTINGS, angle="auto", offset=(0.0, 0.2)) == ("net", 1.3, (0.0, 0.2))
+    assert sought == [None, (0.0, 0.2)]
+    asked.pop()
     assert oriented_net(None, SETTINGS, angle=0.7, offset=(0.0, 0.5)) == ("net", 1.7, (0.0, 0.5))
     assert asked == [(0.3, (0.5, 0.0)), (0.7, (0.0, 0.5))]
 
