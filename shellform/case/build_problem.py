@@ -67,10 +67,10 @@ def case_problem(
         shares.append((entry.built_misfit, built_misfit(shell, start, design, tolerances, seed=seed)))
     total = sum(share for share, _ in shares)
     others = [name for name in loads if name not in ("none", "design")]
-    constraints: list[Constraint] = [AtMost(case.cable.force_max, CableForces("design"))]
+    most = cable_force_planned(case)
+    constraints: list[Constraint] = [AtMost(most, CableForces("design"))]
     constraints += [AtMost(entry.misfit_rms_additional, RmsMisfit(name)) for name in others]
     if entry.method != "paper":  # whose constraint (5) is on the design load; cables break under any
-        most = case.cable.force_max
         constraints += [AtMost(most, LargestCableForce(name, most)) for name in loads if name != "design"]
     constraints += _engineers(case, shell, loads)
     if case.robust is not None:
@@ -100,6 +100,12 @@ def case_problem(
         variables,
         built_under=tuple(name for name in loads if loads[name].any()),
     )
+
+
+def cable_force_planned(case: Case) -> float:
+    """N, that a cable may pull as planned: what `limits.cable_utilisation` leaves of `cable.force_max`."""
+    share = case.limits.cable_utilisation
+    return case.cable.force_max * (1.0 if share is None else share)
 
 
 def varied(case: Case, shell: Gridshell, *, frees_radius: bool = True) -> list[Variable]:

@@ -92,7 +92,7 @@ class NetEntry(Entry):
         0.0, description="of u rods against the x axis, degrees; auto: with least bending"
     )
     offset: tuple[float, float] = Field(
-        (0.0, 0.0), description="of the net's origin from the middle, in spacings; left out with angle auto: sought too"
+        (0.0, 0.0), description="of the net's origin from the middle, spacings; with auto (0, 0) is sought"
     )
     elements: PositiveInt = Field(4, le=100, description="beam elements a segment")
     guides: list[list[tuple[float, float]]] | None = Field(

@@ -29,13 +29,14 @@ from shellform.records.words import exceeds, load_title
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
-    mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) the largest
-    `deviation`, m, under the design load, of the perfect structure and as `built`, and `unloaded`; `stress`
-    over strength, connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull
-    `slack`, N, of cables under the `slack_loads`, and by load the least `critical` factor; what is asked of
-    structures as built (`safety`); how the case gives its `rods`' size; and which share of the surface may
-    lie beyond the rods (`uncovered`)."""
+    """What the case limits: tension `force`, N, of cables, of which they may have a share of `pull` as
+    planned, before any load and under each; root mean square `misfit`, m, under the loads beyond the design
+    load; and where an engineer asked for it (None: not) the largest `deviation`, m, under the design load, of
+    the perfect structure and as `built`, and `unloaded`; `stress` over strength, connectors' `turn`, rad,
+    `uplift` and `thrust`, N, of supports under any load, least pull `slack`, N, of cables under the
+    `slack_loads`, and by load the least `critical` factor; what is asked of structures as built (`safety`);
+    how the case gives its `rods`' size; and which share of the surface may lie beyond the rods
+    (`uncovered`)."""
 
     force: float
     misfit: float
@@ -52,6 +53,7 @@ class Bounds:
     safety: AsBuilt | None = None
     rods: RodSizes | None = None
     uncovered: float = 1.0
+    pull: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,13 @@ def _less_stressed(limit: _Limit, found: _Found, rods: RodsOf) -> str:
     if found.row is None or rounded_up(found.value) <= 1.0:
         return allow(limit.entry, found.value)
     return rods.less_stressed(found.row.rod_utilisation_max, found.value, min(limit.most or 1.0, 1.0))
+
+
+def _pulling(force: float, bounds: Bounds) -> str:
+    """What allows a cable so much `force`, N, as planned."""
+    if force <= bounds.force:
+        return allow("limits.cable_utilisation", force / bounds.force)
+    return allow("cable.force_max", force / bounds.pull)
 
 
 @dataclass(frozen=True)
@@ -152,13 +161,14 @@ def limited(rows: Mapping[str, DesignRecord], rods: Mapping[str, RodsOf], bounds
     pulled = _Limit(
         "Largest cable force before any load and under each (5)",
         "cable.force_max",
-        bounds.force,
+        bounds.pull * bounds.force,
         _pull,
         "N",
+        remedy=lambda limit, found, _: _pulling(found.value, bounds),
     )
     designs = list(rods)
     found = [
-        _at_most(pulled, bounds.force, rows, rods),
+        _at_most(pulled, bounds.pull * bounds.force, rows, rods),
         *(_at_most(each, each.most, rows, rods) for each in limits if each.most is not None),
         *_strained_as_built(rows, designs, bounds.force),
     ]
@@ -235,7 +245,7 @@ def _pulled(own: tuple[float, float], then: tuple[float, float] | None, most: fl
         lambda pull: exceeds(pull, most),
         care=f", more than the {newtons(most)} of cable.force_max. Tighten cables to their force before any "
         "load, not to their length alone",
-        more="For more than that take stronger cables",
+        more="For more than that take stronger cables, or plan with a smaller limits.cable_utilisation",
         beyond="with cables beyond cable.force_max as built",
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.case.build_gridshell import rounding_catalogue
-from shellform.case.build_problem import case_problem
+from shellform.case.build_problem import cable_force_planned, case_problem
 from shellform.case.build_safety import case_safety, case_tolerances
 from shellform.case.case import Case
 from shellform.compiled import clock_without_compiling
@@ -101,7 +101,7 @@ def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals],
         cables_max=cable_count,
         symmetric=symmetry,
         deviation_wished=_wished(workspace.case),
-        cable_force_limit=workspace.case.cable.force_max,
+        cable_force_limit=cable_force_planned(workspace.case),
     )
     drop_checkpoint(workspace.folder)
     return replace(summary, optimisation=record)
@@ -246,12 +246,12 @@ def _without_loads(workspace: Workspace, shell: Gridshell, start: Design, none: 
     from shellform.optimiser import optimise as optimiser
 
     workspace.say("optimise", "the design without regard to the loads")
-    entry, cable = workspace.case.optimise, workspace.case.cable
+    entry = workspace.case.optimise
     problem = Problem(
         shell,
         LoadCase("none", none),
         [Share(1.0, Misfit("none"))],
-        [AtMost(cable.force_max, CableForces("none"))],
+        [AtMost(cable_force_planned(workspace.case), CableForces("none"))],
         variables=[RestLengths(entry.rest_length_min, entry.rest_length_max)],
     )
     return optimiser.optimise(

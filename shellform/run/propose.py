@@ -39,7 +39,13 @@ from shellform.run.first_trial import (
 from shellform.run.narrow_holes import narrow_holes
 from shellform.run.plinths import plinths_for
 from shellform.run.proposed_edges import edge_beams_table, edge_beams_told, edges_told, named
-from shellform.run.proposed_shape import built_deviation, optimise_table, rods_strength, stray_told
+from shellform.run.proposed_shape import (
+    built_deviation,
+    cables_pull,
+    optimise_table,
+    rods_strength,
+    stray_told,
+)
 from shellform.run.sizes import THICKNESS, DesignWish, RodChoice, usual_thickness
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
@@ -280,6 +286,7 @@ factors = {{ concrete = {ADDITIONAL!r}, rods = {ADDITIONAL!r} }}   # the design 
 
 [limits]
 {rods_strength(design)}
+{cables_pull(design)}
 {built_deviation(surface, design, stray)}
 
 {optimise_table(surface, design)}

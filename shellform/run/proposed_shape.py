@@ -6,8 +6,8 @@ brings structures as built nearer: where drawn ones of the initial design are be
 what stands nearer.
 
 Once structures as built are adjusted on site their errors add 0.04 of the strength to the rods' stress, and
-0.15 in the worst of twenty, in the median of seventy designs: a tenth is left for that where the initial
-design leaves more.
+0.15 in the worst of twenty, in the median of seventy designs, and to the cables' pull 0.02 to 0.12 of their
+limit: a tenth is left for either where the initial design leaves more.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from shellform.run.first_trial import FirstDesign, millimetres
 from shellform.run.sizes import BUILT_OF_SPAN, OF_SPAN, may_come_off, may_stray
 from shellform.surface.shape.target import Surface
 
-_LEFT = 0.9  # of the rods' strength, that a search may use of a design that begins with `_BEGUN` or less
+# of the rods' strength and of the cables' limit, that a search may use of a design that begins with `_BEGUN`
+_LEFT = 0.9
 _BEGUN = 0.85
 _EVALUATIONS, _POLISHED = 30, 10  # that the case proposed asks for: a first answer in minutes
 
@@ -42,6 +43,17 @@ def rods_strength(design: FirstDesign) -> str:
         return f"utilisation = {_LEFT!r}    # of the rods' strength, under any load: the rest is for errors of building"
     return (
         f"utilisation = 1.0    # of the rods' strength, under any load; {_LEFT!r} would leave some for errors of building, and the "
+        f"initial design comes to {begun:.2f}"
+    )
+
+
+def cables_pull(design: FirstDesign) -> str:
+    """The entry of [limits] for the cables' pull."""
+    begun = design.tried.pull
+    if begun <= _BEGUN:
+        return f"cable_utilisation = {_LEFT!r}    # of cable.force_max, as planned: the rest is for errors of building"
+    return (
+        f"cable_utilisation = 1.0    # of cable.force_max, as planned; {_LEFT!r} would leave some for errors of building, and the "
         f"initial design comes to {begun:.2f}"
     )
 

@@ -81,7 +81,8 @@ def test_every_limit_has_the_case_s_amount_in_the_term_s_own_unit(shell, loads):
             'limits.slack_loads=["none"]',
             "tolerances.supports=1e-4",
             "robust.limit=0.003",
-            "cable.force_max=18.0",
+            "cable.force_max=20.0",
+            "limits.cable_utilisation=0.9",
             "optimise.misfit_rms_additional=0.004",
         ],
     )

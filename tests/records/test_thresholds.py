@@ -437,6 +437,28 @@ def test_the_largest_cable_force_is_that_before_any_load_or_of_the_worst(shell, 
     assert found(shell, designs)[name].found == "7 N", "the design's own where no load's is known"
 
 
+@pytest.mark.parametrize(
+    ("pull", "force", "remedy"),
+    [
+        (0.9, 18.0, ""),
+        (0.9, 18.5, "Allow limits.cable_utilisation = 0.93."),
+        (0.9, 20.0, "Allow limits.cable_utilisation = 1."),
+        (0.9, 20.7, "Allow cable.force_max = 23."),
+        (1.0, 20.7, "Allow cable.force_max = 21."),
+    ],
+)
+def test_of_what_cables_may_bear_as_built_a_share_may_be_left_as_planned(shell, designs, pull, force, remedy):
+    name = "Largest cable force before any load and under each (5)"
+    loads = {each: load(each, cable_force_max=force) for each in ("none", "design", "additional")}
+    made = summary(designs).with_design("polished", design(loads=loads, cable_force_max=force))
+    asked = replace(BOUNDS, pull=pull)
+    check = {each.name: each for each in checks({"polished": shell}, designs, made, asked)}[name]
+    assert check.limit == f"{20.0 * pull:g} N"
+    cell = check.cells["polished"]
+    assert cell.holds is not bool(remedy)
+    assert cell.remedy == remedy or cell.holds
+
+
 def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_breaks_them(shell, designs):
     rods, cables = (
         "Rods' stress as built under the design load",
@@ -486,7 +508,9 @@ def test_what_rods_and_cables_bear_as_built_is_told_and_asks_for_care_where_it_b
         assert headline(record).startswith(
             f"The polished design holds{', ' if said else ''}{', '.join(said)}: all"
         )
-    assert then[cables].caution.endswith("20.5 N in the worst. For more than that take stronger cables")
+    assert then[cables].caution.endswith(
+        "20.5 N in the worst. For more than that take stronger cables, or plan with a smaller limits.cable_utilisation"
+    )
     slack = {"none": load("none", cable_force_max=0.0)}
     slack["design"] = load("design", built_shape=shape((1.06, 1.3), (18.0, 18.0)))
     rows = summary(designs).with_design("polished", design(loads=slack, cable_force_max=4.0))

@@ -29,7 +29,13 @@ from shellform.run.first_refusal import Refused, WayOut
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts, Followed
 from shellform.run.propose import propose_case
 from shellform.run.proposed_edges import edge_beams_table, edge_beams_told
-from shellform.run.proposed_shape import built_deviation, optimise_table, rods_strength, stray_told
+from shellform.run.proposed_shape import (
+    built_deviation,
+    cables_pull,
+    optimise_table,
+    rods_strength,
+    stray_told,
+)
 from shellform.run.sizes import (
     LEAST_PRESTRAIN,
     STRAINED,
@@ -732,3 +738,10 @@ def test_a_tenth_of_the_rods_strength_is_left_for_errors_where_the_initial_desig
     assert tomllib.loads(entry) == {"utilisation": limit}
     assert ("for errors of building" in entry) == (limit < 1.0 or "comes to 0.86" in entry)
     assert ("0.86" in entry) == (limit == 1.0)
+
+
+@pytest.mark.parametrize(("pull", "limit"), [(0.4, 0.9), (0.85, 0.9), (0.86, 1.0)])
+def test_a_tenth_of_the_cables_limit_is_left_for_errors_where_the_initial_design_leaves_more(pull, limit):
+    entry = cables_pull(SimpleNamespace(tried=SimpleNamespace(pull=pull)))
+    assert tomllib.loads(entry) == {"cable_utilisation": limit}
+    assert ("comes to 0.86" in entry) == (limit == 1.0)
