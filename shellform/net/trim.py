@@ -9,7 +9,7 @@ would bend out there as it likes; so is one on which fewer than two joints remai
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -239,7 +239,7 @@ def _keep(
             break
         for each in poor:
             remaining -= each.keys()
-    remaining = _largest(joints, remaining)
+    joined, remaining = remaining, _largest(joints, remaining)
     if not remaining:
         raise NoNet(
             Reason.EMPTY,
@@ -253,32 +253,40 @@ def _keep(
         for piece, each in zip(pieces, joints, strict=True)
         if remaining & each.keys()
     ]
-    notes = []
-    if close:
-        within = f"nearer to the edge than {merge * grid.scale:.3g} m"
-        near = how_many(len(close), f"joint {within} was left out", f"joints {within} were left out")
-        notes.append(NetNote(NoteKind.JOINTS, near))
-    if loose:
-        free = f"beside the edge, with no joint over {_FREE:g} spacings or more,"
-        beside = how_many(
-            len(loose), f"rod that runs {free} was left out", f"rods that run {free} were left out"
-        )
-        notes.append(NetNote(NoteKind.RODS, beside))
-    if len(kept) + len(loose) < len(pieces):
-        without = f"with fewer than {fewest} joints" if fewest > 1 else "without a joint"
-        few = how_many(
-            len(pieces) - len(kept) - len(loose),
-            f"rod {without} was left out",
-            f"rods {without} were left out",
-        )
-        notes.append(NetNote(NoteKind.RODS, few))
-    single = sum(len(joints) < FEWEST for _, joints in kept)
+    apart = sum(bool(joined & each.keys()) and not remaining & each.keys() for each in joints)
+    few = len(pieces) - len(kept) - len(loose) - apart
+    single = sum(len(own) < FEWEST for _, own in kept)
+    notes = [
+        *([_joints_told(len(close), merge * grid.scale)] if close else []),
+        *_rods_told(fewest, loose=len(loose), apart=apart, few=few, single=single),
+    ]
+    return kept, notes
+
+
+def _joints_told(close: int, near: float) -> NetNote:
+    """That so many joints were left out which are as `near`, m, to the edge."""
+    within = f"nearer to the edge than {near:.3g} m"
+    return NetNote(
+        NoteKind.JOINTS,
+        how_many(close, f"joint {within} was left out", f"joints {within} were left out"),
+    )
+
+
+def _rods_told(fewest: int, *, loose: int, apart: int, few: int, single: int) -> Iterator[NetNote]:
+    """Why how many rods were left out, or stay with a single joint."""
+    which = (
+        (loose, f"that run{{}} beside the edge, with no joint over {_FREE:g} spacings or more,"),
+        (apart, "of parts of the grid that no rod joins to the largest"),
+        (few, f"with fewer than {fewest} joints" if fewest > 1 else "without a joint"),
+    )
+    for count, what in which:
+        if count:
+            one, many = what.format("s"), what.format("")
+            told = how_many(count, f"rod {one} was left out", f"rods {many} were left out")
+            yield NetNote(NoteKind.RODS, told)
     if single:
         stay = how_many(single, "rod of a single joint stays", "rods of a single joint stay")
-        notes.append(
-            NetNote(NoteKind.RODS, f"{stay}: without, more of the surface would lie beyond the rods")
-        )
-    return kept, notes
+        yield NetNote(NoteKind.RODS, f"{stay}: without, more of the surface would lie beyond the rods")
 
 
 def _loose(piece: _Piece, arcs: list[float], step: float) -> bool:

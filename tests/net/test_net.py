@@ -1,12 +1,14 @@
 """The Chebyshev net of the paper-scale vault, and the compass method's closed forms."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import shellform as sf
 from shellform.errors import InputError
+from shellform.net import trim
 from shellform.net.compass import _corner
 from shellform.net.grid import neighbours
 from shellform.net.saved import load_net, net_document, save_net
@@ -54,6 +56,38 @@ def test_rods_keep_their_length_when_bent(net):
         bent = np.linalg.norm(np.diff(place[rod.nodes], axis=0), axis=1).sum()
         assert bent == pytest.approx(rod.length, rel=3e-3)  # chords of a curve, and the springs' own strain
         assert (np.diff(rod.marks) > 0).all()
+
+
+class Lattice:
+    """Rods with their joints one step apart, along x and across: as many on a side of each part."""
+
+    def __init__(self, *sides):
+        self.pieces, self.spacing, self.scale = [], 1.0, 1.0
+        first = 0
+        for side in sides:
+            numbers = first + np.arange(side * side).reshape(side, side)
+            first += side * side
+            for direction, lines in (("u", numbers), ("v", numbers.T)):
+                for line in lines:
+                    joints = [(int(c), k + 1.0) for k, c in enumerate(line)]
+                    rod = SimpleNamespace(direction=direction)
+                    self.pieces.append(
+                        SimpleNamespace(rod=rod, start=0.0, end=side + 1.0, joints=lambda own=joints: own)
+                    )
+
+    def step(self, direction):
+        return self.spacing
+
+
+def test_rods_of_a_part_that_nothing_joins_to_the_largest_are_told_apart_from_those_with_few_joints():
+    lattice = Lattice(5, 3)
+    kept, notes = trim._keep(lattice, lattice.pieces, 0.2, 2)
+    assert len(kept) == 10
+    assert [each.text for each in notes] == [
+        "6 rods of parts of the grid that no rod joins to the largest were left out"
+    ]
+    whole = Lattice(5)
+    assert trim._keep(whole, whole.pieces, 0.2, 2)[1] == []
 
 
 def test_equation_1_gives_the_largest_radius(net):
