@@ -76,7 +76,6 @@ from shellform.run.unbuildable import (
     refuse_flat,
     refuse_size,
     refuse_tipping,
-    refused,
     sharpest,
     too_curved,
 )
@@ -209,8 +208,7 @@ class _Search:
 
     def _vain(self, spacing: float, finer: float) -> bool:
         """Whether a finer spacing is too fine to solve, or far too little help."""
-        if self.best is None:
-            raise refused(self.surface, None, self.wish)
+        assert self.best is not None
         ended = self.allowance.over or not self.allowance.thorough
         return ended or finer_is_vain(self.best, self.surface.area, spacing, finer)
 

@@ -225,11 +225,11 @@ def refuse_tipping(net: Net) -> None:
 
 
 def refused(
-    surface: Surface, failure: Obstacle | None, wish: DesignWish, *, design: FirstDesign | None = None
+    surface: Surface, failure: Obstacle, wish: DesignWish, *, design: FirstDesign | None = None
 ) -> InputError | NotConverged:
     """What to say of a shell that can't be built: as an error, to be raised. `design`: one with less concrete
     that was found to stand."""
-    if failure is None or failure.why is Why.NET:
+    if failure.why is Why.NET:
         return _uncovered(surface, failure, wish)
     choice = failure.choice
     assert choice is not None
@@ -248,14 +248,11 @@ def refused(
     return _fallen(failure, choice, design)
 
 
-def _uncovered(surface: Surface, failure: Obstacle | None, wish: DesignWish) -> Unbuildable:
+def _uncovered(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildable:
     """The refusal of a surface that no net covers."""
-    error = None if failure is None else failure.error
+    error, spacing = failure.error, failure.spacing
     most, radius = sharpest_bend(surface)
-    spacing = 0.0 if failure is None else failure.spacing
-    needed = max(COVERED * spacing, _RATHER * radius)
-    if failure is not None:
-        needed = max(needed, _rounding(surface, failure, wish))
+    needed = max(COVERED * spacing, _RATHER * radius, _rounding(surface, failure, wish))
     return Unbuildable(
         f"no net of {spacing:g} m covers the surface, which is curved most at {_at(surface.vertices[most])}, to a radius of "
         f"{radius:.3g} m{'' if error is None else f': {_said(error)}'}",

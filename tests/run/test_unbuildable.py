@@ -240,11 +240,14 @@ def bent(monkeypatch):
     return SURFACE
 
 
-def test_where_no_net_covers_a_surface_it_is_to_be_rounded_where_it_is_bent_most_inside_its_edge(bent):
-    told = refused(bent, None, DesignWish())
-    assert (told.why, told.spacing, told.radius) == (Why.NET, 0.0, pytest.approx(0.75))
+def test_where_no_net_covers_a_surface_it_is_to_be_rounded_where_it_is_bent_most_inside_its_edge(
+    bent, monkeypatch
+):
+    monkeypatch.setattr(unbuildable, "_rounding", lambda *_: 0.1)
+    told = refused(bent, Obstacle(Why.NET, 0.1, 0.05), DesignWish())
+    assert (told.why, told.spacing, told.radius) == (Why.NET, 0.1, pytest.approx(0.75))
     assert (
-        "no net of 0 m covers the surface, which is curved most at (1.5, 2, 3) m, to a radius of 0.5 m"
+        "no net of 0.1 m covers the surface, which is curved most at (1.5, 2, 3) m, to a radius of 0.5 m"
         in told.what
     )
     assert told.remedy == "Round the surface there to 0.75 m or more."
