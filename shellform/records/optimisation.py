@@ -29,7 +29,9 @@ class OptimisationRecord:
     """What came of the optimisation.
 
     - `objective_start`, `objective_end`; `status`: a sentence on why it ended.
-    - `constraints`: value over limit less 1, by name; `feasible`: whether the optimised design keeps them.
+    - `constraints`: by name, at most 0 where kept: value over limit less 1, of a misfit the square of that,
+      of softness and of least pulls as optimiser/limits_told.py reads them; `feasible`: whether the optimised
+      design keeps them.
     - `iterations`, `evaluations` (`rejected` ones left the stable branch; those that were none better too
       are marked in history.csv), solved `equilibria`, and `factorisations` (those of rejected evaluations:
       `factorisations_rejected`): the work that it took.
