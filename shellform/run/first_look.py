@@ -34,8 +34,8 @@ from shellform.records.files import plain
 from shellform.records.progress import Event, Kind, Report
 from shellform.records.summary import NetRecord, Summary, SurfaceRecord, write_summary
 from shellform.run.figures import pictures_possible
-from shellform.run.folder import alone, refuse_overwriting
-from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
+from shellform.run.folder import BUILDABLE, alone, refuse_overwriting
+from shellform.run.way_out import COVERED, with_way_out
 from shellform.surface.readers.reading import FORMATS, kind_of, states_unit
 from shellform.surface.readers.stated import stated_unit
 from shellform.surface.shape.target import Surface, largest_curvature

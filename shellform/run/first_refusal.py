@@ -23,10 +23,11 @@ from shellform.run.first_net import Allowance
 from shellform.run.first_steadier import strays, with_strays
 from shellform.run.first_thinner import least_layer
 from shellform.run.first_trial import FirstDesign
+from shellform.run.folder import BUILDABLE
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish, usual_thickness
 from shellform.run.unbuildable import Falls, Tips, Unbuildable, Why, flat_between_creases
-from shellform.run.way_out import BUILDABLE, COVERED, Nearest, nearest_buildable, renewed
+from shellform.run.way_out import COVERED, Nearest, nearest_buildable, renewed
 from shellform.surface.shape.target import Surface
 
 _SHARES = (0.2, 0.5, 1.0)  # of the radius at which rods bear the load by a cautious estimate

@@ -31,15 +31,15 @@ from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
 from shellform.written import clear, make_folder, refusal, write_arrays
 
-LOCK = "lock"
+LOCK, BUILDABLE = "lock", "buildable"
 DESIGNS = ("unbraced", "initial", "unloaded", *BUILT)
 WRITTEN = (
     "case.toml", "summary.json", "stages.json", "history.csv", "surface.npz", "net.npz", "net.json", "designs", "states", "figures",
-    "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt", "profile.json", "catalogues", LOCK,
+    "drawings", "schedules", "models", BUILDABLE, "optimise.npz", "report.html", "log.txt", "profile.json", "catalogues", LOCK,
 )  # fmt: skip
 
 # folders that files stand in
-_PARTS = ("", "designs", "states", "figures", "drawings", "schedules", "models", "catalogues")
+_PARTS = ("", "designs", "states", "figures", "drawings", "schedules", "models", BUILDABLE, "catalogues")
 
 
 class NoRunFolder(InputError):

@@ -37,7 +37,15 @@ from shellform.records.summary import ModelRecord, Summary, outdated, read_summa
 from shellform.run import designs
 from shellform.run.broken_off import break_off
 from shellform.run.checkpoint import drop_checkpoint
-from shellform.run.folder import alone, load_surface, read_run, refuse_links, refuse_overwriting, save_surface
+from shellform.run.folder import (
+    BUILDABLE,
+    alone,
+    load_surface,
+    read_run,
+    refuse_links,
+    refuse_overwriting,
+    save_surface,
+)
 from shellform.run.judged import judged
 from shellform.run.kept_case import write_case
 from shellform.run.keys import stage_keys
@@ -47,7 +55,7 @@ from shellform.run.pages import FILE, write_page
 from shellform.run.pictures_beside import DrawnMaps, draw_all_but, maps_beside
 from shellform.run.profiling import Profiler
 from shellform.run.sketch import STAGES_OF_SKETCH, draw_sketch, drop_other, refuse_over_full, sketched
-from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
+from shellform.run.way_out import COVERED, with_way_out
 from shellform.run.workspace import Workspace
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface

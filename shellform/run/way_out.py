@@ -21,10 +21,9 @@ from shellform.quantities import coordinates, number
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.fairing import Faired, faired
 from shellform.surface.shape.target import Surface
-from shellform.written import make_folder
+from shellform.written import make_folder, whole
 
 SURFACE = "surface.obj"
-BUILDABLE = "buildable"  # folder in a run's
 COVERED = 3.0  # spacings: a radius of curvature that nets cover
 MORE = (1.0, 1.5, 2.2)  # times the radius asked for
 _CLOSE = 1.1  # from one radius to the next, at the least
@@ -161,7 +160,8 @@ def _step(path: Path, surface: Surface) -> str:
     from shellform.surface.cad import write_fitted
 
     try:
-        write_fitted(path, surface)
+        with whole(path) as partial:
+            write_fitted(partial, surface)
     except (InputError, NotConverged):  # openings, or no gmsh: the mesh is there all the same
         path.unlink(missing_ok=True)
         return ""

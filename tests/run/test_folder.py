@@ -139,7 +139,7 @@ def test_what_killed_writers_left_is_cleared_away_by_the_next_run(copy):
     assert (copy / "net.npz").is_file()
 
 
-@pytest.mark.parametrize("name", ["log.txt", "report.html", "case.toml", "figures", "lock"])
+@pytest.mark.parametrize("name", ["log.txt", "report.html", "case.toml", "figures", "buildable", "lock"])
 def test_symbolic_links_in_a_run_folder_lead_nobody_elsewhere(copy, tmp_path, name):
     outside = tmp_path / "outside"
     outside.mkdir()

@@ -693,8 +693,10 @@ def test_a_surface_written_as_a_mesh_comes_back_and_is_the_same_bytes_each_time(
     assert len(back.triangles) == len(surface.triangles)
     with pytest.raises(InputError, match=r"isn't a mesh format.*\.stl"):
         write_mesh(tmp_path / "dome.xyz", surface)
+    (tmp_path / "none").touch()
     with pytest.raises(InputError, match="can't be written"):
         write_mesh(tmp_path / f"none/dome.{ending}", surface)
+    assert len(list(tmp_path.iterdir())) == 3, "and nothing half-written stays"
 
 
 def ellipse_on_the_cap(share):

@@ -13,6 +13,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
+from shellform.written import whole
 
 if TYPE_CHECKING:  # which loads numba, and the reader's process does without
     from shellform.surface.shape.target import Surface
@@ -58,28 +59,25 @@ def read_msh(file: Path, choice: Choice) -> Draft:
 
 
 def write_mesh(path: str | Path, surface: Surface) -> None:
-    """Writes the triangles in metres, in the format of the path's ending: the same bytes each time. Raises
-    InputError for an ending that isn't known.
+    """Writes the triangles in metres, in the format of the path's ending, whole or not at all: the same bytes
+    each time. Raises InputError for an ending that isn't known and where it can't be written.
     """
     kind = _WRITTEN.get(Path(path).suffix.lower())
     if kind is None:
         raise InputError(
             "isn't a mesh format that is written", where=str(path), remedy=f"Known: {', '.join(_WRITTEN)}."
         )
-    try:
-        meshio.Mesh(surface.vertices, [("triangle", surface.triangles)]).write(path, file_format=kind)
+    with whole(path) as partial:
+        meshio.Mesh(surface.vertices, [("triangle", surface.triangles)]).write(partial, file_format=kind)
         if kind in _STAMPED:
-            whole = Path(path).read_bytes()
-            Path(path).write_bytes(_STAMP.sub(rb"\1", whole, count=1))
-    except OSError as error:
-        raise InputError(
-            f"can't be written: {error}", where=str(path), remedy="Choose another folder."
-        ) from error
+            partial.write_bytes(_STAMP.sub(rb"\1", partial.read_bytes(), count=1))
 
 
 def write_values(path: Path, surface: Surface, values: Mapping[str, Reals]) -> None:
-    """Writes the triangles, in metres, as an unstructured grid (.vtu) with `values` (v,) at the vertices."""
-    meshio.Mesh(surface.vertices, [("triangle", surface.triangles)], dict(values)).write(path, "vtu")
+    """Writes the triangles, in metres, as an unstructured grid (.vtu) with `values` (v,) at the vertices,
+    whole or not at all. Raises InputError where it can't be written."""
+    with whole(path) as partial:
+        meshio.Mesh(surface.vertices, [("triangle", surface.triangles)], dict(values)).write(partial, "vtu")
 
 
 def write_lines(
