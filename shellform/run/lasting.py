@@ -41,13 +41,15 @@ def lasting(folder: Path, done: StagesDone, summary: Summary) -> StagesDone:
 
 def _files(stage: str, summary: Summary) -> tuple[str, ...]:
     """What a stage leaves in any case."""
-    designs = [design_file(name) for name in summary.designs if (name in _BEFORE) == (stage == "initial")]
+    own = [name for name in summary.designs if (name in _BEFORE) == (stage == "initial")]
+    designs = tuple(file for name in own for file in _of_design(name, summary))
+    drawn = [name for name, row in summary.designs.items() if any(each.stands for each in row.loads.values())]
     named = {
         "surface": ("surface.npz",),
         "net": ("net.npz", "net.json"),
-        "initial": tuple(designs),
+        "initial": designs,
         "optimise": (history.FILE, *designs),
-        "safety": (),
+        "safety": tuple(f"designs/{name}-drawn.json" for name in drawn),
         "figures": (PICTURE,) if summary.sketch else _pictures(summary),
         "documents": _DOCUMENTS,
         "report": (PAGE,),
@@ -55,7 +57,12 @@ def _files(stage: str, summary: Summary) -> tuple[str, ...]:
     return named[stage]
 
 
+def _of_design(name: str, summary: Summary) -> tuple[str, ...]:
+    """A design, its model and its states."""
+    states = (f"states/{name}-{load}.vtp" for load in summary.designs[name].loads)
+    return (design_file(name), f"designs/{name}.json", *states)
+
+
 def _pictures(summary: Summary) -> tuple[str, ...]:
     maps = [f"{name}-{load}" for name, design in summary.designs.items() for load in design.loads]
-    states = (f"states/{name}.vtp" for name in maps)
-    return (*(f"figures/{name}.png" for name in (*_MAPS, *maps)), *states)
+    return tuple(f"figures/{name}.png" for name in (*_MAPS, *maps))

@@ -2,12 +2,13 @@
 
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from shellform.records.stages import STAGES, StagesDone, read_stages
 from shellform.records.summary import Summary, read_summary
-from shellform.run.lasting import lasting
+from shellform.run.lasting import _files, lasting
 from shellform.run.run import run_case
 from tests.command import ROOT
 from tests.run.small_run import finish, small_case
@@ -60,7 +61,10 @@ def done_in(folder):
         ("figures/deviations.png", "figures"),
         ("figures/net-skew.png", "figures"),
         ("figures/optimised-additional.png", "figures"),
-        ("states/unbraced-none.vtp", "figures"),
+        ("states/unbraced-none.vtp", "initial"),
+        ("states/optimised-design.vtp", "optimise"),
+        ("designs/initial.json", "initial"),
+        ("designs/optimised.json", "optimise"),
         ("drawings/cables.dxf", "documents"),
         ("schedules/marks.csv", "documents"),
         ("models/gridshell.3dm", "documents"),
@@ -74,11 +78,25 @@ def test_a_stage_of_which_a_file_was_deleted_is_not_done_nor_are_those_after_it(
     assert done_in(copy) == list(STAGES[: STAGES.index(stage)])
 
 
+def test_of_designs_whose_structures_were_drawn_these_are_asked_for():
+    loads = {
+        name: SimpleNamespace(
+            loads={"none": SimpleNamespace(stands=None), "design": SimpleNamespace(stands=stands)}
+        )
+        for name, stands in (("unbraced", None), ("initial", "12 of 12"), ("polished", "200 of 200"))
+    }
+    found = _files("safety", SimpleNamespace(designs=loads, sketch=False))
+    assert found == ("designs/initial-drawn.json", "designs/polished-drawn.json")
+
+
 def test_where_nothing_was_done_nothing_is_missing(tmp_path):
     assert lasting(tmp_path, StagesDone(), Summary()) == StagesDone()
 
 
-@pytest.mark.parametrize("name", ["surface.npz", "net.npz", "designs/initial.npz"])
+@pytest.mark.parametrize(
+    "name",
+    ["surface.npz", "net.npz", "designs/initial.npz", "designs/initial.json", "states/initial-design.vtp"],
+)
 def test_run_again_the_deleted_file_is_there_with_the_same_bytes(begun, tmp_path, name):
     """It was told "kept", or that the run is unfinished and goes on by the very command that said so."""
     copy = Path(shutil.copytree(begun, tmp_path / "run"))
@@ -86,6 +104,6 @@ def test_run_again_the_deleted_file_is_there_with_the_same_bytes(begun, tmp_path
     told = []
     run_case(small_case(ROOT), copy, until="initial", report=told.append)
     assert (copy / name).read_bytes() == (begun / name).read_bytes()
-    stage = {"surface.npz": "surface", "net.npz": "net", "designs/initial.npz": "initial"}[name]
+    stage = {"surface.npz": "surface", "net.npz": "net"}.get(name, "initial")
     kept = [event.stage for event in told if event.kind.value == "kept"]
     assert kept == list(STAGES[: STAGES.index(stage)])
