@@ -392,4 +392,6 @@ def outdated(summary: Summary, stage: str) -> Summary:
         )
     if STAGES.index(stage) <= STAGES.index("safety"):
         summary = replace(summary.unexamined(), verdict=None)
+    if STAGES.index(stage) <= STAGES.index("documents"):
+        summary = replace(summary, documents=None)
     return summary

@@ -49,7 +49,7 @@ from shellform.run.folder import (
 from shellform.run.judged import judged
 from shellform.run.kept_case import write_case
 from shellform.run.keys import stage_keys
-from shellform.run.lasting import lasting
+from shellform.run.lasting import lasting, take_away
 from shellform.run.log import logged
 from shellform.run.pages import FILE, write_page
 from shellform.run.pictures_beside import DrawnMaps, draw_all_but, maps_beside
@@ -172,6 +172,7 @@ def _run_alone(workspace: Workspace, fresh: bool, parts: Parts, began: float) ->
         summary, done = outdated(summary, first), done.before(first)
         write_stages(folder, done)
         write_summary(folder, summary)
+        take_away(folder, first)
     drop_other(folder, sketch=workspace.sketch)
     write_case(folder, workspace.case)
     return _stages(workspace, parts, summary, done, began)

@@ -8,7 +8,7 @@ import pytest
 
 from shellform.records.stages import STAGES, StagesDone, read_stages
 from shellform.records.summary import Summary, read_summary
-from shellform.run.lasting import _files, lasting
+from shellform.run.lasting import _files, lasting, take_away
 from shellform.run.run import run_case
 from tests.command import ROOT
 from tests.run.small_run import finish, small_case
@@ -87,6 +87,40 @@ def test_of_designs_whose_structures_were_drawn_these_are_asked_for():
     }
     found = _files("safety", SimpleNamespace(designs=loads, sketch=False))
     assert found == ("designs/initial-drawn.json", "designs/polished-drawn.json")
+
+
+@pytest.mark.parametrize(
+    ("stage", "stay"),
+    [
+        ("net", []),
+        ("optimise", ["figures/net-skew.png"]),
+        ("safety", ["figures/net-skew.png", "figures/deviations.png"]),
+        ("documents", ["figures/net-skew.png", "figures/deviations.png", "figures/failure.png"]),
+        ("report", ["figures/net-skew.png", "figures/deviations.png", "figures/failure.png", "drawings/grid.pdf",
+                    "schedules/edge_beams.csv", "models/gridshell.step", "schedules/rods.csv"]),
+    ],
+)  # fmt: skip
+def test_what_shows_a_design_that_is_made_anew_is_taken_away_and_what_was_told_on_site_stays(
+    whole, tmp_path, stage, stay
+):
+    copy = Path(shutil.copytree(whole, tmp_path / "run"))
+    told = ["schedules/erection.csv", "schedules/belief-1.npz"]
+    for name in ("figures/failure.png", "schedules/edge_beams.csv", "models/gridshell.step", *told):
+        (copy / name).touch()
+    take_away(copy, stage)
+    shown = ("figures/net-skew.png", "figures/deviations.png", "figures/failure.png", "drawings/grid.pdf",
+             "schedules/edge_beams.csv", "models/gridshell.step", "schedules/rods.csv")  # fmt: skip
+    assert [name for name in shown if (copy / name).is_file()] == stay
+    assert all((copy / name).is_file() for name in (*told, "designs/initial.npz", "history.csv"))
+
+
+def test_a_run_with_other_rods_that_ends_early_keeps_no_drawings_of_those_before(whole, tmp_path):
+    """Its rods.csv still said \"2 layers of 50 mm\" beside a case of one of 30 mm."""
+    copy = Path(shutil.copytree(whole, tmp_path / "run"))
+    run_case(small_case(ROOT, "rod.radius=0.0009"), copy, until="initial")
+    assert not list((copy / "drawings").iterdir())
+    assert not (copy / "schedules/rods.csv").exists()
+    assert read_summary(copy).documents is None
 
 
 def test_where_nothing_was_done_nothing_is_missing(tmp_path):
