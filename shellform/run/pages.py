@@ -20,7 +20,7 @@ from shellform.output.page.shown_run import ShownRun
 from shellform.records.history import read_history
 from shellform.records.profile import read_profile
 from shellform.records.progress import Event, Report, unheard
-from shellform.records.stages import read_stages
+from shellform.records.stages import SHOWING, read_stages
 from shellform.records.verdict import verdict
 from shellform.run.design_files import design_file
 from shellform.run.folder import DESIGNS, LOCK, Run, read_run
@@ -128,7 +128,8 @@ def _notes(run: Run, has_pictures: bool) -> list[str]:
         f"The design “{name}” is not shown: its stage has not finished. Run shellform design again."
         for name in broken_off
     ]
-    if "initial" not in done:
+    failed = run.summary.failed
+    if "initial" not in done and "initial" not in failed:
         notes.append(
             "What is shown was computed before the last change of the case, of its surface, or of shellform: "
             "run shellform design again."
@@ -137,15 +138,15 @@ def _notes(run: Run, has_pictures: bool) -> list[str]:
         notes.append(
             "The optimised designs were computed before the last change of the case: run shellform design again."
         )
-    if run.summary.optimisation is None and "optimise" not in run.summary.failed:
+    if run.summary.optimisation is None and all(stage in SHOWING for stage in failed):
         notes.append(
             "The run is not optimised (yet): run shellform design without --until, and the optimised design is added."
         )
-    if not has_pictures and not run.summary.failed:
+    if not has_pictures and not failed:
         notes.append(
             "There are no pictures: the stage “figures” has not run, or found no OpenGL. shellform render makes them."
         )
-    for stage, why in run.summary.failed.items():
+    for stage, why in failed.items():
         notes.append(f"The stage “{stage}” failed: {why}")
     return notes
 

@@ -39,6 +39,7 @@ from shellform.run.broken_off import break_off
 from shellform.run.checkpoint import drop_checkpoint
 from shellform.run.folder import (
     BUILDABLE,
+    DESIGNS,
     alone,
     load_surface,
     read_run,
@@ -301,8 +302,8 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
     nodes = len(network.nodes)
     model = ModelRecord(nodes, len(network.beams.ends), len(network.cables.ends), 6 * nodes)
     summary = replace(summary, model=model, designs={})
-    # whose load cases may have had other names
-    summary = designs.forget(workspace.folder, ("unbraced", "initial"), summary)
+    # whose load cases may have had other names, and with those that an earlier run made of it
+    summary = designs.forget(workspace.folder, DESIGNS, summary)
     unbraced = {"unbraced": shell.unbraced()} if case.cable.without else {}
     for name, design in {**unbraced, "initial": start}.items():
         workspace.say("initial", f"loading the {name} design", Kind.BEGAN)

@@ -12,7 +12,7 @@ from shellform.records.summary import Summary, read_summary
 from shellform.run import broken_off
 from shellform.run.run import run_case
 from tests.records import made
-from tests.run.small_run import small_case
+from tests.run.small_run import begin, finish, small_case
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -50,6 +50,19 @@ def test_the_page_of_an_early_end_goes_though_nothing_else_could_be_written_of_i
     (tmp_path / "run/report.html").write_text("ended early", encoding="utf-8")
     run_case(small_case(ROOT), tmp_path / "run", until="net")
     assert not (tmp_path / "run/report.html").exists()
+
+
+def test_a_finished_run_whose_changed_case_falls_shows_nothing_of_the_design_before(tmp_path):
+    """It named the design before as one whose stage hadn't finished, and asked for a run without --until."""
+    place = tmp_path / "run"
+    finish(begin(ROOT, place))
+    with pytest.raises(NotConverged, match="deforms excessively"):
+        run_case(small_case(ROOT, "rod.radius=0.0003", "load.force=20.0"), place)
+    page = text_of(place)
+    assert "The initial design does not hold" in page
+    assert not list(place.glob("designs/optimised*"))
+    for stale in ("has not finished", "before the last change", "--until", "“optimised”"):
+        assert stale not in page
 
 
 def test_a_run_with_a_design_that_deforms_too_much_shows_it_and_says_so_first(tmp_path):
