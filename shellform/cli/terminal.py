@@ -151,6 +151,8 @@ def tell_as_built(summary: Summary) -> None:
     if summary.verdict is not None:
         name = summary.verdict.design
         slack = before_load_words(summary.designs, name)
+        if slack and summary.documents is not None:
+            slack += ": schedules/cables.csv"
         ways = summary.designs[name].ways_up if name in summary.designs else None
         raised = raising_words(ways) if ways else ""
         for note in (*shape_notes(summary, name), slack, raised):

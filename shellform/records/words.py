@@ -172,7 +172,7 @@ def before_load_words(designs: Mapping[str, DesignRecord], name: str) -> str:
     if row is None or not row.slack:
         return ""
     hang = "hangs" if len(row.slack) == 1 else "hang"
-    return f"Before any load {listed(row.slack)} {hang} slack: schedules/cables.csv"
+    return f"Before any load {listed(row.slack)} {hang} slack"
 
 
 def way_up_words(way: WayUpRecord) -> str:
