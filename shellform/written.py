@@ -4,6 +4,7 @@ So an interrupted run leaves nothing half-written, and a full disc or a closed f
 Beside its place a file has a name of its own that can't be foreseen and nothing had before: two processes
 never write to the same one, and no symbolic link in a folder that somebody else made leads a writer
 elsewhere. A writer holds a lock on it, which ends with its process: what is left without one may be deleted.
+What is no file, a device or a pipe, is never replaced by one. Where somebody named a link, it is followed.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import contextlib
 import errno
 import os
 import secrets
+import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -34,6 +36,8 @@ _REMEDIES = {
     errno.EROFS: "Choose a folder that you may write to.",
     errno.ELOOP: "Delete the symbolic link: links in a folder are not followed.",
     errno.ENOENT: "Was the folder deleted meanwhile? Run the same command again.",
+    errno.EPIPE: "Whoever was reading it has ended: let it read to the end.",
+    errno.ENXIO: "Give the name of a file.",
 }
 _PART = ".part-"
 _STEM = 100  # characters of a file's name that its partial one has too
@@ -43,8 +47,8 @@ _STEM = 100  # characters of a file's name that its partial one has too
 def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
     """The place to write to; what is there at the end of the block becomes `path`. Makes the folder.
 
-    Raises InputError for another `ending` and where the file can't be written; what stood there before is
-    left as it was.
+    A link there is replaced, not followed. Raises InputError for another `ending`, for a device or a pipe,
+    and where the file can't be written; what stood there before is left as it was.
     """
     target = Path(path)
     if ending and target.suffix.lower() != ending:
@@ -53,6 +57,12 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
         )
     if not target.name:
         raise InputError("is a folder", where=str(target), remedy="Give the name of a file in it, too.")
+    if _is_no_file(target):
+        raise InputError(
+            "is a device, a pipe or a socket, which no file takes the place of",
+            where=str(target),
+            remedy="Choose another name or folder.",
+        )
     partial = target.with_name(f"{target.stem[:_STEM]}{_PART}{secrets.token_hex(8)}{target.suffix}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -64,6 +74,15 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def _is_no_file(target: Path) -> bool:
+    """Whether a device, a pipe or a socket stands there, or a link leads to one."""
+    try:
+        kind = target.stat().st_mode
+    except OSError:  # nothing is there, or what writing will tell
+        return False
+    return not (stat.S_ISREG(kind) or stat.S_ISDIR(kind))
 
 
 def refuse_overwriting(files: Iterable[Path], read: Iterable[Path | None]) -> None:
@@ -128,6 +147,28 @@ def write_text(path: str | Path, text: str, ending: str = "") -> None:
     content = encoded(text, str(path))
     with whole(path, ending) as partial:
         partial.write_bytes(content)
+
+
+def write_named(path: str | Path, text: str) -> None:
+    """As `write_text`, to a place that somebody named: a link is followed; a device or a pipe, which no file
+    may take the place of, and what standard output goes to, as /dev/stdout, is written into."""
+    target = Path(path)
+    if not _is_no_file(target) and not _is_standard_output(target):
+        write_text(os.path.realpath(target), text)
+        return
+    content = encoded(text, str(target))
+    try:
+        with target.open("ab") as opened:  # after what stands there already, as where it is left out
+            opened.write(content)
+    except OSError as error:
+        raise refusal(target, error) from error
+
+
+def _is_standard_output(target: Path) -> bool:
+    try:
+        return os.path.samestat(target.stat(), os.fstat(1))
+    except OSError:  # it isn't there, or there is no standard output
+        return False
 
 
 def encoded(text: str, where: str) -> bytes:

@@ -2,15 +2,18 @@
 
 import errno
 import os
+import socket
+import stat
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
 
 from shellform.arrays import read_arrays
 from shellform.errors import InputError
-from shellform.written import clear, is_partial, make_folder, whole, write_arrays, write_text
+from shellform.written import clear, is_partial, make_folder, whole, write_arrays, write_named, write_text
 
 
 def test_a_file_takes_its_place_when_it_is_whole(tmp_path):
@@ -111,3 +114,84 @@ def test_a_link_under_a_partial_name_is_not_followed_when_it_is_cleared(tmp_path
     (tmp_path / "a.part-0123.txt").symlink_to(tmp_path / "mine.txt")
     clear(tmp_path)
     assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+def pipe(file):
+    os.mkfifo(file)
+    return file
+
+
+def link(file, leads):
+    file.symlink_to(leads)
+    return file
+
+
+def test_a_device_or_pipe_is_written_into_where_it_is_named_and_never_becomes_a_file(tmp_path):
+    there = pipe(tmp_path / "pipe"), link(tmp_path / "link", tmp_path / "pipe")
+    for place in there:
+        read = []
+        reader = threading.Thread(
+            target=lambda read=read: read.append((tmp_path / "pipe").read_text()), daemon=True
+        )
+        reader.start()
+        write_named(place, "all of it")
+        reader.join(10)
+        assert read == ["all of it"]
+        with pytest.raises(InputError, match=r"is a device, a pipe or a socket.*Choose another name"):
+            write_text(place, "all of it")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["link", "pipe"]
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
+    assert (tmp_path / "link").is_symlink()
+
+
+def test_a_reader_that_ends_too_early_is_told(tmp_path):
+    place = pipe(tmp_path / "pipe")
+
+    def read_a_little():
+        with place.open("rb") as opened:
+            opened.read(1)
+
+    reader = threading.Thread(target=read_a_little, daemon=True)
+    reader.start()
+    with pytest.raises(InputError, match=r"Broken pipe.*let it read to the end"):
+        write_named(place, 1_000_000 * "a")
+    reader.join(10)
+
+
+def test_what_cannot_be_written_into_is_told_and_stays(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # a socket's path has at most 107 letters
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind("socket")
+        with pytest.raises(InputError, match=r"^socket: can't be written: .*Give the name of a file"):
+            write_named("socket", "words")
+    assert stat.S_ISSOCK(os.stat("socket").st_mode)
+
+
+def test_a_link_is_followed_where_it_is_named_and_else_replaced(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    named = link(tmp_path / "named.txt", tmp_path / "mine.txt")
+    open_ended = link(tmp_path / "open.txt", "new.txt")
+    found = link(tmp_path / "found.txt", tmp_path / "mine.txt")
+    write_text(found, "ours")
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+    assert not found.is_symlink()
+    write_named(named, "results")
+    write_named(open_ended, "more")
+    assert (tmp_path / "mine.txt").read_text() == "results"
+    assert (tmp_path / "new.txt").read_text() == "more"
+    assert named.is_symlink()
+    assert open_ended.is_symlink()
+
+
+NAMED = "import sys; from shellform.written import write_named; write_named(sys.argv[1], 'ours')"
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/fd/1"), reason="standard output has no name here")
+def test_standard_output_by_its_name_is_written_after_what_a_file_holds(tmp_path):
+    output = link(tmp_path / "output", "/proc/self/fd/1")  # as /dev/stdout is
+    (tmp_path / "all.txt").write_text("before, ")
+    with (tmp_path / "all.txt").open("a") as out:
+        subprocess.run([sys.executable, "-c", NAMED, output], stdout=out, check=True)
+    assert (tmp_path / "all.txt").read_text() == "before, ours"
+    piped = subprocess.run([sys.executable, "-c", NAMED, output], capture_output=True, check=True)
+    assert piped.stdout == b"ours"

@@ -52,7 +52,7 @@ def analyse(
     from shellform.structure.answers.results import read_sections
     from shellform.structure.model import read_model
     from shellform.structure.solve.memory import limited_to_free_memory
-    from shellform.written import refuse_overwriting, write_text
+    from shellform.written import refuse_overwriting, write_named
 
     if output is not None and output.is_dir():
         raise InputError("is a folder, no file", where=str(output), remedy="Name a file in it.")
@@ -82,7 +82,7 @@ def analyse(
     if output is None:
         print(text)
     else:
-        write_text(output, text)
+        write_named(output, text)
     if figures is not None:
         from shellform.output.pictures.model_states import draw_analysis
 

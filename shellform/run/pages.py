@@ -5,7 +5,7 @@ at all.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
@@ -27,7 +27,7 @@ from shellform.run.folder import DESIGNS, LOCK, Run, read_run
 from shellform.run.judged import broken_off, run_checks
 from shellform.run.keys import stage_keys
 from shellform.run.scales import colour_limit
-from shellform.written import is_partial, write_text
+from shellform.written import is_partial, write_named, write_text
 
 FILE = "report.html"
 _BUDGET = 5_000_000  # bytes of pictures, before they become text, which adds a third: a page stays below 8 MB
@@ -51,16 +51,20 @@ def write_report(
     for folder in folders:
         report(Event("report", f"reading {folder}"))
         runs.append(read_run(folder))
-    return write_page(
-        runs, Path(file) if file is not None else (runs[0].folder if len(runs) == 1 else Path()) / FILE
-    )
+    if file is not None:
+        return _written(runs, Path(file), write_named)
+    return write_page(runs, (runs[0].folder if len(runs) == 1 else Path()) / FILE)
 
 
 def write_page(runs: Sequence[Run], file: Path) -> Path:
     """As `write_report`, of runs that are read already."""
+    return _written(runs, file, write_text)
+
+
+def _written(runs: Sequence[Run], file: Path, write: Callable[[Path, str], None]) -> Path:
     _refuse_foreign(file)
     text = html([shown_run(run, _BUDGET // len(runs), page=file) for run in runs], versions())
-    write_text(file, text)
+    write(file, text)
     return file
 
 
@@ -197,8 +201,7 @@ def _refuse_foreign(file: Path) -> None:
     if not file.exists():
         return
     try:
-        with file.open(encoding="utf-8") as text:
-            own = GENERATOR in text.read(_HEAD)
+        own = file.is_file() and _names_us(file)  # to read from a pipe is to wait for its writer
     except (OSError, UnicodeDecodeError):
         own = False
     if not own:
@@ -207,3 +210,8 @@ def _refuse_foreign(file: Path) -> None:
             where=str(file),
             remedy="Choose another --output.",
         )
+
+
+def _names_us(file: Path) -> bool:
+    with file.open(encoding="utf-8") as text:
+        return GENERATOR in text.read(_HEAD)

@@ -49,7 +49,7 @@ from shellform.run.proposed_shape import (
 from shellform.run.sizes import THICKNESS, DesignWish, RodChoice, usual_thickness
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
-from shellform.written import write_text
+from shellform.written import write_named
 
 _SEARCH = 2 / 3  # of the work that a surface is worth: the search for a design of it as it is
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
@@ -199,7 +199,7 @@ def _written(
     title = asked.file.stem + ("" if file == asked.file else ", nearest buildable surface")
     stray = stray_told(design, surface, steady)
     far = "; ".join(each for each in (far_told(design, surface), stray) if each)
-    write_text(asked.output, _text(asked.file, title, entries, surface, design, wish, edges, stray))
+    write_named(asked.output, _text(asked.file, title, entries, surface, design, wish, edges, stray))
     return {
         "size": size_text(surface.size),
         **({"plinths": ready.plinths} if ready.plinths else {}),

@@ -2,10 +2,13 @@
 
 import html
 import json
+import os
 import re
 import signal
+import stat
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -88,6 +91,24 @@ def test_a_result_takes_the_place_of_no_file_that_it_was_computed_from(tmp_path)
         refused(ended, "would be overwritten", output.name)
     refused(shellform("analyse", model, "--load", "tip", "--output", tmp_path), "is a folder")
     assert model.read_bytes() == before
+
+
+def test_a_result_goes_into_the_pipe_or_the_file_that_its_name_leads_to(tmp_path):
+    arguments = ["analyse", model_file(tmp_path), "--load", "tip", "--output"]
+    os.mkfifo(tmp_path / "pipe.json")
+    (tmp_path / "link.json").symlink_to(tmp_path / "result.json")
+    read = []
+    reader = threading.Thread(target=lambda: read.append((tmp_path / "pipe.json").read_text()), daemon=True)
+    reader.start()
+    ended = shellform(*arguments, tmp_path / "pipe.json")
+    assert ended.returncode == 0, ended.stderr
+    reader.join(10)
+    assert json.loads(read[0])["converged"]
+    ended = shellform(*arguments, tmp_path / "link.json")
+    assert ended.returncode == 0, ended.stderr
+    assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["converged"]
+    assert stat.S_ISFIFO((tmp_path / "pipe.json").stat().st_mode)
+    assert (tmp_path / "link.json").is_symlink()
 
 
 def test_the_way_to_an_example_is_told_as_a_shell_takes_it(tmp_path):

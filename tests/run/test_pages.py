@@ -1,6 +1,7 @@
 """The page of runs: what it says of whole, unfinished and damaged runs, and what is refused."""
 
 import json
+import os
 import re
 import shutil
 from dataclasses import replace
@@ -168,6 +169,17 @@ def test_another_program_s_file_is_not_written_over_and_a_page_is(copy, tmp_path
         assert write_report([copy]) == copy / "report.html"
     with pytest.raises(InputError, match="can't be written"):
         write_report([copy], other / "below" / "page.html")
+
+
+def test_a_page_goes_where_a_link_that_is_named_leads_and_takes_no_pipe_s_place(copy, tmp_path):
+    named = tmp_path / "latest.html"
+    named.symlink_to(tmp_path / "page.html")
+    assert write_report([copy], named) == named
+    assert named.is_symlink()
+    assert (tmp_path / "page.html").is_file()
+    os.mkfifo(tmp_path / "pipe.html")
+    with pytest.raises(InputError, match="no page of shellform"):  # without waiting for what comes out of it
+        write_report([copy], tmp_path / "pipe.html")
 
 
 def test_several_runs_stand_side_by_side_with_the_settings_that_differ(begun, finished, tmp_path):
