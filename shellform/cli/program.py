@@ -5,6 +5,8 @@ Large libraries are loaded by the command that needs them.
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
 from typing import Annotated
 
@@ -32,6 +34,7 @@ from shellform.errors import STOPPED, InputError
 # bytes of addresses: where fewer were free, libraries ended the program or never came back
 _ROOM_TO_SOLVE, _ROOM_TO_DESIGN = 590_000_000, 1_200_000_000
 _SOLVING, _READING = ("analyse", "verify"), ("docs", "example")
+_UNREAD = 3  # whoever read the output was gone before it was told how the command ends
 _KEPT = "stopped; what was computed is kept, and the same command goes on from there"
 
 
@@ -106,7 +109,12 @@ def main() -> None:
             heed()
             if status == STOPPED:
                 raise KeyboardInterrupt
+            _hand_over()
             sys.exit(status if isinstance(status, int) else 0)
+        except SystemExit as end:
+            if isinstance(end.__context__, BrokenPipeError):  # as typer and rich leave then
+                sys.exit(_UNREAD)
+            raise
         except (KeyboardInterrupt, typer.Abort):
             _leave(_KEPT, STOPPED)
         except typer.Exit as stop:
@@ -115,6 +123,17 @@ def main() -> None:
             if pressed():  # compiled loops, and processes that read for this one, make errors of it
                 _leave(_KEPT, STOPPED)
             _fail(error)
+
+
+def _hand_over() -> None:
+    """Writes what standard output still holds, while it can be told that it takes no more; Python would try
+    once more as it ends, and make a status of its own of it."""
+    try:
+        print(end="", flush=True)
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):  # whoever read it has had enough, and the command is done
+            raise
 
 
 def _fail(error: Exception) -> None:
@@ -126,5 +145,8 @@ def _fail(error: Exception) -> None:
 
 
 def _leave(message: str, status: int) -> None:
-    print(f"shellform: {message}", file=sys.stderr)
+    with contextlib.suppress(OSError):  # either of them may be what takes no more
+        _hand_over()
+    with contextlib.suppress(OSError):
+        print(f"shellform: {message}", file=sys.stderr)
     sys.exit(status)

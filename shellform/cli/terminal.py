@@ -7,13 +7,14 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from shellform.cli.interruption import heed
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, printable
 from shellform.records.progress import Event, Kind
 
 if TYPE_CHECKING:
     from shellform.records.summary import Summary, VerdictRecord
     from shellform.run.onsite import SiteResult
 
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _LASTING = (Kind.BEGAN, Kind.NOTE, Kind.KEPT, Kind.DONE)  # which stay as lines
 
 
@@ -51,14 +52,32 @@ def refusal_words(error: Exception) -> tuple[str, int] | None:
         return f"no result: {error}", 3
     if isinstance(error, MemoryError):
         return "no result: the memory is full. Choose a larger spacing or fewer elements.", 3
-    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
-        return f"refused: {str(error.filename)[:30]} …: the file's name is too long", 2
+    system = _system_words(error) if isinstance(error, OSError) else None
+    if system is not None:
+        return f"refused: {system}", 2
     if getattr(error, "exit_code", None) is None:
         return None
     told = getattr(error, "format_message", None)  # click's usage errors
     context = getattr(error, "ctx", None)
     remedy = f". {context.command_path} --help lists what it takes." if context else ""
     return f"refused: {str(told() if told else error).rstrip('.')}{remedy or '.'}", 2
+
+
+def _system_words(error: OSError) -> str | None:
+    """Of what the system refuses what can be met anywhere and isn't our fault; None for the rest."""
+    if error.errno == errno.ENAMETOOLONG:
+        return f"{str(error.filename)[:30]} …: the file's name is too long"
+    if error.errno in _FULL:  # a file of a run tells it itself: what is left is written without a name
+        place = printable(str(error.filename or "standard output or a temporary file"))
+        return (
+            f"{place}: can't be written: {error.strerror}. Free some space, then run the same command again."
+        )
+    if isinstance(error, PermissionError) and error.filename:
+        return (
+            f"{printable(str(error.filename))}: can't be read or written: {error.strerror}. "
+            "Give yourself the right to, or name another place."
+        )
+    return None
 
 
 def tell_designs(summary: Summary) -> None:

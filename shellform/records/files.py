@@ -16,7 +16,7 @@ from typing import Any, TypeVar, cast
 
 from pydantic import TypeAdapter, ValidationError
 
-from shellform.errors import Damaged, unreadable
+from shellform.errors import Damaged, InputError, unreadable
 
 ANEW = "Run again with --fresh."
 _T = TypeVar("_T")
@@ -63,6 +63,19 @@ def read_record(path: Path, kind: type[_T]) -> _T:
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
         raise _refusal(path, first) from error
+
+
+def names_format(path: Path, name: str) -> bool:
+    """Whether a file seems to be of the format with that name, be it damaged: the name stands at its
+    beginning. Raises InputError where nobody may look."""
+    try:
+        return path.is_file() and name.encode() in path.read_bytes()[:200]
+    except OSError as error:
+        raise InputError(
+            unreadable(error),
+            where=str(path),
+            remedy="Give yourself the right to read it, choose another --output, or let --fresh overwrite it.",
+        ) from error
 
 
 @cache

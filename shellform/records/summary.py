@@ -16,7 +16,7 @@ from shellform.net.cover import BarePatch
 from shellform.net.quality import NetNumbers
 from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.failures import FailureRecord, RareRecord
-from shellform.records.files import ANEW, plain, read_record, text_of
+from shellform.records.files import ANEW, names_format, plain, read_record, text_of
 from shellform.records.optimisation import OptimisationRecord, SectionRecord
 from shellform.records.raising import WayUpRecord
 from shellform.records.scattering import RobustRecord
@@ -329,10 +329,10 @@ class _Head:
 def summary_version(folder: Path) -> str:
     """The version of shellform that wrote a folder's summary; "" where there is no summary.
 
-    Raises InputError for a file of a newer format, and for a damaged one.
+    Raises InputError for a file of a newer format, for a damaged one, and for one that can't be read.
     """
     path = folder / FILE
-    if not _is_ours(path):
+    if not names_format(path, FORMAT):
         return ""
     head = read_record(path, _Head)
     if head.format != FORMAT:
@@ -365,11 +365,6 @@ def document(summary: Summary) -> dict[str, Any]:
     """The summary as its file says it."""
     found: dict[str, Any] = plain(summary)
     return found
-
-
-def _is_ours(path: Path) -> bool:
-    """Whether a file seems to be a summary, be it damaged: the word stands at its beginning."""
-    return path.is_file() and FORMAT.encode() in path.read_bytes()[:200]
 
 
 def _refuse_newer(path: Path, head: _Head) -> None:

@@ -321,6 +321,40 @@ def test_letters_that_a_terminal_does_not_know_become_question_marks():
     assert "5 ? 5 ? 3 m" in told.stdout
 
 
+def told_to(output, *arguments, unbuffered):
+    """A command's status and what it says where its standard output is `output`."""
+    ended = subprocess.run(
+        [sys.executable, "-m", "shellform", *map(str, arguments)],
+        stdout=output,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+        check=False,
+    )
+    return ended.returncode, ended.stderr
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_output_that_takes_no_more_is_told_and_one_that_nobody_reads_ends_a_command_quietly(
+    tmp_path, unbuffered
+):
+    commands = ["check", "surfaces/hypar.obj"], ["analyse", model_file(tmp_path), "--load", "tip"]
+    if os.path.exists("/dev/full"):
+        with open("/dev/full", "wb") as full:
+            for command in commands:
+                status, said = told_to(full, *command, unbuffered=unbuffered)
+                assert status == 2
+                assert "standard output or a temporary file: can't be written: No space left" in said
+                assert "Traceback" not in said
+                assert "Exception" not in said
+    reading, writing = os.pipe()
+    os.close(reading)
+    # Where each line is written at once a command can't come to its end; else its status is its own.
+    assert told_to(writing, *commands[0], unbuffered=unbuffered) == (3 if unbuffered else 0, "")
+    os.close(writing)
+
+
 def test_a_number_of_five_thousand_digits_is_refused(tmp_path):
     (tmp_path / "case.toml").write_text(f"[net]\nspacing = {'9' * 5000}\n", encoding="utf-8")
     refused(shellform("check", tmp_path / "case.toml"), "isn't valid TOML", "digits")

@@ -128,6 +128,17 @@ def test_published_numbers_that_do_not_hold_are_counted(capsys):
         (NotConverged("lost"), 3, "no result: lost"),
         (MemoryError(), 3, "the memory is full"),
         (OSError(errno.ENAMETOOLONG, "too long", "a" * 300), 2, f"refused: {30 * 'a'} …"),
+        (OSError(errno.ENOSPC, "No space left"), 2, "refused: standard output or a temporary file: can't be"),
+        (
+            OSError(errno.EFBIG, "too large", "a.tmp"),
+            2,
+            "a.tmp: can't be written: too large. Free some space",
+        ),
+        (
+            PermissionError(errno.EACCES, "not yours", "a\nb"),
+            2,
+            "a\\nb: can't be read or written: not yours. Give",
+        ),
     ],
 )
 def test_errors_end_a_command_with_2_where_the_input_is_refused_and_with_3_without_a_result(
@@ -139,7 +150,7 @@ def test_errors_end_a_command_with_2_where_the_input_is_refused_and_with_3_witho
 
 
 def test_errors_of_ours_are_not_told_as_refusals():
-    for error in (ValueError("oh"), OSError(errno.EACCES, "no", "file")):
+    for error in (ValueError("oh"), OSError(errno.EINVAL, "no", "file"), PermissionError(errno.EPERM, "no")):
         assert refusal_words(error) is None
 
 

@@ -2,6 +2,7 @@
 sentence.
 """
 
+import errno
 import json
 import resource
 import shutil
@@ -114,6 +115,20 @@ def test_files_that_shellform_did_not_write_are_not_overwritten_without_fresh(tm
     assert own.read_text(encoding="utf-8") == "{}"
     run_case(small_case(ROOT), tmp_path, until="surface", fresh=True)
     assert "shellform-summary" in (tmp_path / "summary.json").read_text(encoding="utf-8")
+
+
+def test_a_summary_that_cannot_be_read_is_refused_unless_it_may_be_overwritten(copy, monkeypatch):
+    usual = Path.read_bytes
+
+    def read_bytes(path):
+        if path == copy / "summary.json":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return usual(path)
+
+    monkeypatch.setattr(Path, "read_bytes", read_bytes)
+    with pytest.raises(InputError, match=r"summary\.json: can't be read: Permission denied\. .*--fresh"):
+        run_case(small_case(ROOT), copy, until="surface")
+    run_case(small_case(ROOT), copy, until="surface", fresh=True)
 
 
 def test_two_runs_do_not_work_in_one_folder_and_the_lock_ends_with_its_holder(copy):
