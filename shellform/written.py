@@ -63,7 +63,7 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
             where=str(target),
             remedy="Choose another name or folder.",
         )
-    partial = target.with_name(f"{target.stem[:_STEM]}{_PART}{secrets.token_hex(8)}{target.suffix}")
+    partial = _beside(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with _made(partial):
@@ -74,6 +74,21 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def refuse_unwritable(path: str | Path) -> None:
+    """Raises InputError where `write_named` could make no file, before what it is to hold is computed."""
+    target = Path(os.path.realpath(path))
+    partial = _beside(target)
+    try:
+        with _made(partial):
+            partial.unlink()
+    except OSError as error:
+        raise refusal(target, error) from error
+
+
+def _beside(target: Path) -> Path:
+    return target.with_name(f"{target.stem[:_STEM]}{_PART}{secrets.token_hex(8)}{target.suffix}")
 
 
 def _is_no_file(target: Path) -> bool:

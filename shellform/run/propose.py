@@ -49,7 +49,7 @@ from shellform.run.proposed_shape import (
 from shellform.run.sizes import THICKNESS, DesignWish, RodChoice, usual_thickness
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
-from shellform.written import write_named
+from shellform.written import refuse_unwritable, write_named
 
 _SEARCH = 2 / 3  # of the work that a surface is worth: the search for a design of it as it is
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
@@ -348,6 +348,7 @@ def _check(output: Path) -> None:
         raise InputError(
             "there is no such folder", where=str(output.parent), remedy="Make it, or choose another --output."
         )
+    refuse_unwritable(output)
 
 
 def _short(value: float) -> float:

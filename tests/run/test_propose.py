@@ -1,5 +1,7 @@
 """`shellform new`: what it proposes stands, and what can't be built is said with a way out that works."""
 
+import errno
+import os
 import re
 import tomllib
 from dataclasses import replace
@@ -243,6 +245,23 @@ def test_a_case_is_not_overwritten_nor_written_under_another_name_or_to_nowhere(
     with pytest.raises(InputError, match="no such folder"):
         propose_case(DOME, tmp_path / "no" / "mine.toml", {}, allow_scripts=False)
     assert (tmp_path / "mine.toml").read_text() == "mine"
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_the_surface_is_read(tmp_path, monkeypatch):
+    usual = os.open
+
+    def opened(file, flags, *mode, **where):
+        if flags & os.O_CREAT and Path(file).parent == tmp_path:
+            raise PermissionError(errno.EACCES, "Permission denied", str(file))
+        return usual(file, flags, *mode, **where)
+
+    with monkeypatch.context() as closed:
+        closed.setattr(os, "open", opened)
+        with pytest.raises(InputError, match=r"mine\.toml: can't be written: .*Choose a folder that you may"):
+            propose_case(tmp_path / "no.stl", tmp_path / "mine.toml", {}, allow_scripts=False)
+    with pytest.raises(InputError, match=r"no\.stl"):
+        propose_case(tmp_path / "no.stl", tmp_path / "mine.toml", {}, allow_scripts=False)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_wished_for_is_checked():
