@@ -35,7 +35,7 @@ from shellform.errors import STOPPED, InputError
 _ROOM_TO_SOLVE, _ROOM_TO_DESIGN = 590_000_000, 1_200_000_000
 _SOLVING, _READING = ("analyse", "verify"), ("docs", "example")
 _UNREAD = 3  # whoever read the output was gone before it was told how the command ends
-_KEPT = "stopped; what was computed is kept, and the same command goes on from there"
+_RESUMED = ("design", "study")
 
 
 app = typer.Typer(
@@ -116,13 +116,21 @@ def main() -> None:
                 sys.exit(_UNREAD)
             raise
         except (KeyboardInterrupt, typer.Abort):
-            _leave(_KEPT, STOPPED)
+            _leave(_stopped(sys.argv[1:]), STOPPED)
         except typer.Exit as stop:
             sys.exit(stop.exit_code)
         except Exception as error:
             if pressed():  # compiled loops, and processes that read for this one, make errors of it
-                _leave(_KEPT, STOPPED)
+                _leave(_stopped(sys.argv[1:]), STOPPED)
             _fail(error)
+
+
+def _stopped(arguments: list[str]) -> str:
+    """What Ctrl-C leaves of the command that stands first among the arguments, and what to do."""
+    command = next((each for each in arguments if not each.startswith("-")), "")
+    if command in _RESUMED:
+        return "stopped; what was computed is kept, and the same command goes on from there"
+    return "stopped; what was not finished is lost, and the same command begins anew"
 
 
 def _hand_over() -> None:

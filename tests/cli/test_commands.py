@@ -391,7 +391,19 @@ def test_an_angle_that_is_no_number_is_refused(tmp_path):
         refused(shellform(*arguments, angle), "--angle: must be degrees or auto")
 
 
-def test_ctrl_c_within_compiled_code_stops_as_anywhere_else(monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [(name, "is kept, and the same command goes on from there") for name in ("design", "study")]
+    + [
+        (name, "not finished is lost, and the same command begins anew")
+        for name in ("new", "net", "check", "verify", "survey", "analyse")
+    ],
+)
+def test_ctrl_c_within_compiled_code_stops_as_anywhere_else_and_what_is_kept_is_told(
+    monkeypatch, capsys, command, said
+):
+    monkeypatch.setattr(sys, "argv", ["shellform", command, "design"])
+
     def interrupted(standalone_mode):
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
@@ -407,7 +419,7 @@ def test_ctrl_c_within_compiled_code_stops_as_anywhere_else(monkeypatch, capsys)
     finally:
         signal.signal(signal.SIGINT, before)
     assert end.value.code == 130
-    assert "the same command goes on from there" in capsys.readouterr().err
+    assert said in capsys.readouterr().err
     assert after is signal.default_int_handler
 
 
