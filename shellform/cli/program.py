@@ -41,7 +41,7 @@ _RESUMED = ("design", "study")
 app = typer.Typer(
     name="shellform",
     help="Design bending-active gridshells as falsework for concrete shells.",
-    no_args_is_help=True,
+    invoke_without_command=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -84,6 +84,9 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show versions.")
     ] = False,
 ) -> None:
+    if context.invoked_subcommand is None:
+        print(context.get_help(), file=sys.stderr)
+        raise typer.Exit(2)
     if context.invoked_subcommand not in _READING:
         _require_room(_ROOM_TO_SOLVE if context.invoked_subcommand in _SOLVING else _ROOM_TO_DESIGN)
 

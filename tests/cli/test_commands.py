@@ -174,6 +174,13 @@ def test_what_no_command_takes_is_refused_with_where_to_read_what_it_does():
     refused(shellform("render", "run", "--limit", "wide"), "'--limit'", "render --help lists")
 
 
+def test_without_a_command_the_help_stands_on_standard_error_as_it_is():
+    alone, asked = shellform(), shellform("--help")
+    assert (alone.returncode, alone.stdout) == (2, "")
+    assert (asked.returncode, asked.stdout) == (0, alone.stderr)
+    assert alone.stderr.startswith("Usage: ")
+
+
 def test_check_takes_what_a_file_leaves_open_and_tells_what_was_mended(tmp_path):
     standing = shellform("check", "surfaces/hypar.obj", "--unit", "cm", "--up", "y")
     assert standing.returncode == 0, standing.stderr
