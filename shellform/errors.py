@@ -59,7 +59,10 @@ def how_many(count: int, one: str, many: str) -> str:
 
 def unreadable(error: Exception) -> str:
     """That a file can't be read, and why: of the system's errors their words alone, without number and
-    path."""
+    path; of bytes that are no text in UTF-8 the first and its line."""
+    if isinstance(error, UnicodeDecodeError):
+        line = error.object[: error.start].count(b"\n") + 1
+        return f"isn't text in UTF-8 (byte {error.object[error.start]:#04x} in line {line})"
     system = error.strerror if isinstance(error, OSError) else None
     return f"can't be read: {system or error}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -50,8 +51,10 @@ from shellform.gridshell.catalogue import named, read_catalogue, shipped_catalog
 from shellform.gridshell.gridshell import Rod
 from shellform.gridshell.joints import following
 from shellform.gridshell.tolerances import SOURCES, Tolerances
+from shellform.surface.readers.reading import ENDINGS
 from shellform.written import encoded
 
+_SURFACES = {".py", *ENDINGS} - {".json"}  # models are JSON, too
 _NAME = 255  # bytes, of a file or folder on the systems in use
 _RodEntry = Annotated[
     Annotated[OwnRodEntry, Tag("own")] | Annotated[StockRodEntry, Tag("stock")],
@@ -141,14 +144,25 @@ def load_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
 def read_toml(file: Path) -> dict[str, Any]:
     """The tables of a TOML file. Raises InputError where it can't be read."""
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
+        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
+    except OSError as error:
         raise InputError(
             unreadable(error),
             where=str(file),
             remedy="Name a file that is there, or lay one with: shellform example vault (of a study: study).",
         ) from error
     except ValueError as error:  # TOMLDecodeError, and Python's for a number of thousands of digits
+        if file.suffix.lower() in _SURFACES:
+            made = shlex.quote(f"{file.stem}.toml")
+            raise InputError(
+                "is a surface file, no TOML",
+                where=str(file),
+                remedy=f"Make a case for it: shellform new {shlex.quote(str(file))} --output {made}.",
+            ) from error
+        if isinstance(error, UnicodeDecodeError):
+            raise InputError(
+                unreadable(error), where=str(file), remedy="Name a TOML file, and save it as UTF-8."
+            ) from error
         raise InputError(
             f"isn't valid TOML: {error}",
             where=str(file),

@@ -95,11 +95,13 @@ def read_catalogue(source: str | Path) -> Catalogue:
     """
     path = _SHIPPED / f"{source}.toml" if str(source) in shipped_catalogues() else Path(source)
     try:
-        document = msgspec.toml.decode(path.read_bytes(), type=_CatalogueFile)
+        document = msgspec.toml.decode(path.read_text(encoding="utf-8-sig"), type=_CatalogueFile)
     except OSError as error:
         remedy = f"Shipped are {', '.join(shipped_catalogues())}."
         said = unreadable(error) if path.exists() else "is neither shipped nor a file"
         raise InputError(said, where=f"catalogue {path}", remedy=remedy) from error
+    except UnicodeDecodeError as error:
+        raise InputError(unreadable(error), where=f"catalogue {path}", remedy="Save it as UTF-8.") from error
     except msgspec.ValidationError as error:
         raise refusal(error, _PARTS).within(f"catalogue {path}") from error
     except (msgspec.DecodeError, ValueError, RecursionError) as error:  # ValueError: a number of 5,000 digits

@@ -66,5 +66,5 @@ def _ended(workspace: Workspace, stage: str, error: ShellformError, summary: Sum
                 if file.is_file() and file.name not in (LOCK, FILE) and not is_partial(file)
             )
         ],
-        settings=workspace.path("case.toml").read_text(encoding="utf-8"),
+        settings=workspace.path("case.toml").read_text(encoding="utf-8-sig"),
     )

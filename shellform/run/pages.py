@@ -86,7 +86,7 @@ def shown_run(run: Run, budget: int = _BUDGET, *, page: Path | None = None) -> S
         checks=found,
         verdict=broken_off(verdict(found, run.best), run.summary.failed),
         history=read_history(run.folder),
-        settings=(run.folder / "case.toml").read_text(encoding="utf-8"),
+        settings=(run.folder / "case.toml").read_text(encoding="utf-8-sig"),
         pictures=pictures,
         limit=colour_limit(run),
         notes=[*_notes(run, bool(pictures)), *left],

@@ -7,6 +7,7 @@ Every refusal names the field and the element.
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -107,7 +108,7 @@ def read_model(path: str | Path) -> Model:
     """The model in a file. Raises InputError naming the field and the element."""
     file = Path(path)
     try:
-        content = file.read_bytes()
+        content = file.read_bytes().removeprefix(BOM_UTF8)
     except OSError as error:
         raise InputError(
             unreadable(error),

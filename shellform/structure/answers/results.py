@@ -108,12 +108,12 @@ def read_sections(path: str | Path) -> dict[str, Section]:
     and `strength`, Pa. Raises InputError."""
     file = Path(path)
     try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+        tables = tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(
             unreadable(error),
             where=str(file),
-            remedy="Give the sections as TOML, a table for each kind of beam.",
+            remedy="Give the sections as TOML in UTF-8, a table for each kind of beam.",
         ) from error
     return {kind: _section(table, f"{file}: [{kind}]") for kind, table in tables.items()}
 

@@ -39,7 +39,7 @@ def read_compas(file: Path, choice: Choice) -> Draft:
     can't be used.
     """
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
+        data = json.loads(file.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"isn't whole JSON: {error}", where=str(file), remedy="Save it anew.") from error
     found = list(_tables(data, "", "vertex", "face"))

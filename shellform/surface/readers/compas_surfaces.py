@@ -64,7 +64,7 @@ def read_compas_surfaces(
     """
     from shellform.surface import cad
 
-    found = list(surface_tables(json.loads(file.read_text(encoding="utf-8"))))
+    found = list(surface_tables(json.loads(file.read_text(encoding="utf-8-sig"))))
     names = told_apart([name for name, _ in found], "surface")
     kept = among([("", name) for name in names], choice, str(file))
     read = []

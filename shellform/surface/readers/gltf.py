@@ -85,7 +85,7 @@ def _opened(file: Path) -> tuple[dict[str, Any], bytes]:
     """The scene's JSON and the GLB's binary part."""
     data = file.read_bytes()
     if data[:4] != b"glTF":
-        return json.loads(data.decode("utf-8")), b""
+        return json.loads(data.decode("utf-8-sig")), b""
     length = struct.unpack_from("<I", data, 8)[0]
     if length > len(data):
         raise InputError(
