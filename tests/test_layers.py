@@ -52,7 +52,7 @@ FLOORS = {
     "shellform.structure": [
         ["elements", "refusals"],
         ["solve"],
-        ["network"],
+        ["network", "model_document"],
         ["model"],
         ["answers"],
         ["ahead"],

@@ -1,8 +1,7 @@
 """The model file: one structural model as a JSON document (documentation/reference/model.md).
 
-msgspec reads and checks the document against the structures below in compiled code (a million nodes in about
-two seconds); what a type can't say, ranges, signs and references, is checked on whole arrays afterwards.
-Every refusal names the field and the element.
+What the types of its document (model_document.py) can't say, ranges, signs and references, is checked on
+whole arrays. Every refusal names the field and the element.
 """
 
 from __future__ import annotations
@@ -21,70 +20,20 @@ from shellform.errors import InputError, unreadable
 from shellform.structure.elements.beam import Beams, make_beams
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.state import State, from_vectors
+from shellform.structure.model_document import (
+    GivenBeam,
+    GivenCable,
+    GivenLoad,
+    GivenSupport,
+    ModelDocument,
+    converted,
+    decoded,
+)
 from shellform.structure.network import Network
-from shellform.structure.refusals import check_node, components, node_pairs, positive, refusal
+from shellform.structure.refusals import check_node, components, node_pairs, positive
 from shellform.written import whole
 
 _SKEW, _EXACT = 1e-6, 1e-14  # of axes that are refused, and that are made square
-_Three = tuple[float, float, float]
-_Axes = tuple[_Three, _Three, _Three]
-_Six = tuple[float, float, float, float, float, float]
-
-
-class _Beam(msgspec.Struct, forbid_unknown_fields=True, gc=False):
-    nodes: tuple[int, int]
-    EA: float
-    GJ: float
-    EIy: float
-    EIz: float
-    z_axis: _Three | None = None
-    rest_length: float | None = None
-    kind: str = "rod"
-    axes: tuple[_Axes, _Axes] | None = None
-
-
-class _Cable(msgspec.Struct, forbid_unknown_fields=True, gc=False):
-    nodes: tuple[int, int]
-    EA: float
-    rest_length: float | None = None
-
-
-class _Support(msgspec.Struct, forbid_unknown_fields=True, gc=False):
-    node: int
-    fixed: tuple[bool, bool, bool, bool, bool, bool]
-    displacement: _Six | None = None
-
-
-class _Load(msgspec.Struct, forbid_unknown_fields=True, gc=False):
-    node: int
-    force: _Three | None = None
-    moment: _Three | None = None
-
-
-class _Start(msgspec.Struct, forbid_unknown_fields=True):
-    positions: list[_Three]
-    rotations: list[_Three]
-
-
-class _ModelFile(msgspec.Struct, forbid_unknown_fields=True):
-    format: str
-    version: int
-    nodes: list[_Three]
-    beams: list[_Beam] = []
-    cables: list[_Cable] = []
-    supports: list[_Support] = []
-    loads: dict[str, list[_Load]] = {}
-    start: _Start | None = None
-
-
-_PARTS = {
-    "": _ModelFile,
-    "beams": _Beam,
-    "cables": _Cable,
-    "supports": _Support,
-    "loads": _Load,
-    "start": _Start,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,14 +65,7 @@ def read_model(path: str | Path) -> Model:
             remedy="Name a model file, such as RUN/designs/optimised.json.",
         ) from error
     try:
-        try:
-            document = msgspec.json.decode(content, type=_ModelFile)
-        except msgspec.ValidationError as error:
-            raise refusal(error, _PARTS) from error
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise InputError(
-                f"isn't JSON: {error}", remedy="Mend that place; json.dump writes what is valid."
-            ) from error
+        document = decoded(content)
         del content
         return _model(document)
     except InputError as error:
@@ -133,10 +75,7 @@ def read_model(path: str | Path) -> Model:
 def parse_model(data: object) -> Model:
     """The model in a parsed JSON document, in which NumPy's numbers and arrays may stand. Raises InputError
     naming the field and the element."""
-    try:
-        return _model(msgspec.convert(msgspec.to_builtins(data, enc_hook=_plain), _ModelFile))
-    except msgspec.ValidationError as error:
-        raise refusal(error, _PARTS) from error
+    return _model(converted(msgspec.to_builtins(data, enc_hook=_plain)))
 
 
 def _plain(value: object) -> object:
@@ -219,7 +158,7 @@ def _document(model: Model) -> dict[str, Any]:
     return document
 
 
-def _model(document: _ModelFile) -> Model:
+def _model(document: ModelDocument) -> Model:
     if document.format != "shellform-model":
         raise InputError(
             "must be 'shellform-model'",
@@ -254,7 +193,7 @@ def _model(document: _ModelFile) -> Model:
     return Model(Network(nodes, beams, cables, fixed, imposed), loads, start, tuple(supported))
 
 
-def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
+def _beams(entries: list[GivenBeam], nodes: Reals) -> Beams:
     names = ("EA", "GJ", "EIy", "EIz")
     ends = node_pairs([each.nodes for each in entries], "beams", len(nodes))
     own = np.array([each.axes is not None for each in entries], dtype=bool)
@@ -265,10 +204,9 @@ def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
         positive(np.where(without & ~none.all(axis=0), 1.0, values), "beams", name)
         for name, values, without in zip(names, given, none, strict=True)
     ]
-    undefined = (np.nan, np.nan, np.nan)
-    z_axis = np.array(
-        [undefined if each.z_axis is None else each.z_axis for each in entries], dtype=float
-    ).reshape(-1, 3)
+    left_out = np.array([each.z_axis is None for each in entries], dtype=bool)
+    z_axis = components([each.z_axis or (0.0, 0.0, 1.0) for each in entries], "beams", 3, ".z_axis")
+    z_axis = np.where(left_out[:, None], np.nan, z_axis)
     rest = _rest_lengths(entries, "beams")
     words: dict[str, int] = {"rod": 0}
     kind = np.array([words.setdefault(each.kind, len(words)) for each in entries], dtype=np.int64)
@@ -297,14 +235,14 @@ def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
     return replace(made, frames=frames, axial=ea, torsion=gj, bending_y=eiy, bending_z=eiz)
 
 
-def _rest_lengths(entries: list[_Beam] | list[_Cable], part: str) -> Reals:
+def _rest_lengths(entries: list[GivenBeam] | list[GivenCable], part: str) -> Reals:
     """Those that are given (k,), m; NaN for those left out."""
     given = [each.rest_length for each in entries]
     positive(np.array([1.0 if each is None else each for each in given], dtype=float), part, "rest_length")
     return np.array(given, dtype=float)
 
 
-def _axes(entries: list[_Beam], own: Flags) -> Reals:
+def _axes(entries: list[GivenBeam], own: Flags) -> Reals:
     """The axes (k, 2, 3, 3) at both ends of the beams that give their own, as columns."""
     for beam in np.flatnonzero(own).tolist():
         if entries[beam].z_axis is not None:
@@ -336,7 +274,7 @@ def _axes(entries: list[_Beam], own: Flags) -> Reals:
     return np.asarray(axes.swapaxes(2, 3))
 
 
-def _cables(entries: list[_Cable], nodes: Reals) -> Cables:
+def _cables(entries: list[GivenCable], nodes: Reals) -> Cables:
     ends = node_pairs([each.nodes for each in entries], "cables", len(nodes))
     stiffness = positive(np.array([each.EA for each in entries], dtype=float), "cables", "EA")
     rest = _rest_lengths(entries, "cables")
@@ -353,7 +291,7 @@ def _cables(entries: list[_Cable], nodes: Reals) -> Cables:
     return make_cables(ends, rest_length=np.where(np.isnan(rest), length, rest), stiffness=stiffness)
 
 
-def _supports(entries: list[_Support], count: int) -> tuple[Flags, Reals, list[int]]:
+def _supports(entries: list[GivenSupport], count: int) -> tuple[Flags, Reals, list[int]]:
     fixed, imposed = np.zeros((count, 6), dtype=bool), np.zeros((count, 6))
     nodes: dict[int, int] = {}
     for k, entry in enumerate(entries):
@@ -370,7 +308,7 @@ def _supports(entries: list[_Support], count: int) -> tuple[Flags, Reals, list[i
     return fixed, imposed, list(nodes)
 
 
-def _load(entries: list[_Load], where: str, count: int) -> Reals:
+def _load(entries: list[GivenLoad], where: str, count: int) -> Reals:
     none = (0.0, 0.0, 0.0)
     nodes = np.array([each.node for each in entries], dtype=float)
     outside = (nodes < 0) | (nodes >= count)
@@ -379,8 +317,8 @@ def _load(entries: list[_Load], where: str, count: int) -> Reals:
         check_node(entries[entry].node, f"{where}[{entry}].node", count)
     values = np.hstack(
         [
-            components([each.force or none for each in entries], f"{where}.force", 3),
-            components([each.moment or none for each in entries], f"{where}.moment", 3),
+            components([each.force or none for each in entries], where, 3, ".force"),
+            components([each.moment or none for each in entries], where, 3, ".moment"),
         ]
     )
     load = np.zeros((count, 6))

@@ -58,15 +58,16 @@ def check_node(node: int, where: str, count: int) -> None:
         )
 
 
-def components(rows: Any, where: str, width: int) -> Reals:
-    """Rows (k, width) of finite numbers. Raises InputError."""
+def components(rows: Any, where: str, width: int, field: str = "") -> Reals:
+    """Rows (k, width) of finite numbers, each the `field` of an element where it isn't one itself. Raises
+    InputError."""
     array = np.array(rows, dtype=float).reshape(-1, width)
     wrong = ~(np.abs(array) <= _HUGE).all(axis=1)
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InputError(
             f"must be below {_HUGE:g}, in SI units",
-            where=f"{where}[{row}]",
+            where=f"{where}[{row}]{field}",
             value=array[row].tolist(),
             remedy="Write finite numbers in metres, radians, newtons.",
         )

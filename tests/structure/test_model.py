@@ -87,6 +87,93 @@ def test_a_file_that_is_no_model_is_refused_by_name(tmp_path, text):
         read_model(file)
 
 
+def changed_file(tmp_path, change):
+    """A file as json.dump writes it, which knows NaN and Infinity."""
+    model = copy.deepcopy(bow())
+    change(model)
+    file = tmp_path / "model.json"
+    file.write_text(json.dumps(model), encoding="utf-8")
+    return file
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda m: m["beams"][3].update(EA=np.nan),
+            r"beams\[3\]\.EA: must be a positive number .*nan.*newtons",
+        ),
+        (lambda m: m["beams"][3].update(GJ=np.inf), r"beams\[3\]\.GJ: must be a positive number .*inf"),
+        (lambda m: m["beams"][3].update(z_axis=[0, np.nan, 1]), r"beams\[3\]\.z_axis: .*nan.*finite"),
+        (
+            lambda m: m["cables"][0].update(rest_length=-np.inf),
+            r"cables\[0\]\.rest_length: must be a positive",
+        ),
+        (lambda m: m["nodes"].__setitem__(3, [np.nan, 0, 0]), r"nodes\[3\]: .*nan.*finite"),
+        (
+            lambda m: m["supports"][1].update(displacement=[0, 0, np.inf, 0, 0, 0]),
+            r"supports\[1\]\.displacement.*inf.*finite",
+        ),
+        (
+            lambda m: m["loads"]["push"][1].update(force=[0, np.nan, 0]),
+            r"loads\.push\[1\]\.force: .*nan.*finite",
+        ),
+        (
+            lambda m: m.update(start={"positions": 9 * [[0, 0, np.nan]], "rotations": 9 * [[0, 0, 0]]}),
+            r"start\.positions\[0\]: .*nan.*finite",
+        ),
+        (lambda m: m.update(version=np.nan), r"version: expected a whole number"),
+    ],
+)
+def test_a_number_that_is_not_finite_is_told_with_its_field_and_element(tmp_path, change, message):
+    with pytest.raises(InputError, match=rf"model\.json: {message}"):
+        read_model(changed_file(tmp_path, change))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda m: m["loads"]["push"][1].update(node=1.0),
+            r"loads\.push\[1\]\.node: expected a whole number",
+        ),
+        (
+            lambda m: m["loads"]["push"][1].update(forces=[1]),
+            r"loads\.push\[1\]: unknown field.*mean 'force'",
+        ),
+        (lambda m: m["loads"].update(none=3), r"loads\.none: expected an array"),
+        (lambda m: m.update(loads=[]), "loads: expected an object"),
+    ],
+)
+def test_what_is_wrong_with_a_load_is_told_with_its_name(tmp_path, change, message):
+    with pytest.raises(InputError, match=message):
+        read_model(changed_file(tmp_path, change))
+    model = copy.deepcopy(bow())
+    change(model)
+    with pytest.raises(InputError, match=message):
+        parse_model(model)
+
+
+def test_a_wrong_load_in_a_file_that_is_broken_farther_on_is_told_without_its_name(tmp_path):
+    text = json.dumps({**bow(), "loads": {"push": [{"node": 1.0}]}})
+    (tmp_path / "model.json").write_text(text[:-1], encoding="utf-8")
+    with pytest.raises(InputError, match=r"loads\[0\]\.node: expected a whole number"):
+        read_model(tmp_path / "model.json")
+
+
+def test_a_model_that_is_no_utf_8_is_told_so(tmp_path):
+    for content in (json.dumps(bow()).encode("utf-16"), b'{"format": "\xfc"}'):
+        (tmp_path / "model.json").write_bytes(content)
+        with pytest.raises(InputError, match=r"model\.json: isn't text in UTF-8 .*Save it as UTF-8"):
+            read_model(tmp_path / "model.json")
+
+
+def test_what_only_a_lenient_reader_takes_is_no_json(tmp_path):
+    (tmp_path / "model.json").write_text('{"format": "\\ud800"}', encoding="utf-8")
+    with pytest.raises(InputError, match="isn't JSON"):
+        read_model(tmp_path / "model.json")
+
+
 def test_numpy_s_numbers_and_arrays_make_a_model_as_lists_do_and_other_things_none():
     model = bow()
     model["nodes"] = np.array(model["nodes"])
