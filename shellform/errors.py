@@ -109,12 +109,29 @@ def require_angle(value: float, *, where: str, give: str) -> None:
     """Raises InputError for what is no angle, rad, and for one of more than a whole turn, as degrees are."""
     require_number(value, where=where, give=give)
     if abs(value) > _WHOLE_TURN:
+        meant = math.radians(_without_turns(value, 360.0))
         raise InputError(
             f"{typed(value)} rad is more than a whole turn",
             where=where,
             value=value,
-            remedy=f"Leave whole turns out; if degrees are meant, give {math.radians(value):.4g} rad.",
+            remedy=f"Leave whole turns out, give {_without_turns(value, 2.0 * math.pi):.4g} rad; if degrees are meant, give {meant:.4g} rad.",
         )
+
+
+def require_degrees(value: float, *, where: str, give: str) -> None:
+    """As `require_angle`, for an angle in degrees."""
+    require_number(value, where=where, give=give)
+    if abs(value) > math.degrees(_WHOLE_TURN):
+        raise InputError(
+            f"{typed(value)}° is more than a whole turn",
+            where=where,
+            value=value,
+            remedy=f"Leave whole turns out: for {typed(value)}° give {typed(_without_turns(value, 360.0))}.",
+        )
+
+
+def _without_turns(angle: float, turn: float) -> float:
+    return math.fmod(angle, turn) + 0.0  # no -0
 
 
 def if_per_cents(value: float, most: float) -> str:

@@ -1,6 +1,7 @@
 """What refusals say: where, what was found, between which bounds it must be, and what to give instead."""
 
 import math
+import re
 
 import pytest
 
@@ -11,7 +12,9 @@ from shellform.errors import (
     if_per_cents,
     not_installed,
     printable,
+    require_angle,
     require_count,
+    require_degrees,
     require_known,
     require_number,
     unreadable,
@@ -67,6 +70,33 @@ def test_a_count_is_refused_below_and_beyond_its_bounds_and_where_it_is_no_whole
             require_count(value, where="--limit", give="a number of steps", **bounds)
     for value, bounds in ((1, {}), (10**9, {}), (3, {"least": 3, "most": 7}), (7, {"least": 3, "most": 7})):
         require_count(value, where="--limit", give="a number of steps", **bounds)
+
+
+@pytest.mark.parametrize("value", [405.0, -405.0, 720.0, -720.0, 45.0, 1e9, 359.99999 + 360.0])
+@pytest.mark.parametrize(("require", "turn"), [(require_angle, 2.0 * math.pi), (require_degrees, 360.0)])
+def test_an_angle_of_more_than_a_whole_turn_is_refused_and_what_is_named_in_its_place_is_taken(
+    require, turn, value
+):
+    if abs(value) <= turn:
+        require(value, where="net.angle", give="an angle")
+        return
+    with pytest.raises(InputError, match=r"^net\.angle: .* is more than a whole turn") as told:
+        require(value, where="net.angle", give="an angle")
+    named = [float(each) for each in re.findall(r"give ([-+.e\d]*\d)", told.value.remedy)]
+    assert math.cos(2.0 * math.pi * named[0] / turn) == pytest.approx(
+        math.cos(2.0 * math.pi * value / turn), abs=1e-3
+    )
+    for each in named:
+        require(each, where="net.angle", give="an angle")
+
+
+def test_degrees_of_more_than_a_whole_turn_are_told_in_degrees():
+    for value, said in ((405.0, "for 405° give 45."), (-720.0, "for -720° give 0."), (1e9, "give 280.")):
+        with pytest.raises(InputError, match=said) as told:
+            require_degrees(value, where="net.angle", give="degrees, such as 45")
+        assert "rad" not in str(told.value)
+    with pytest.raises(InputError, match=r"must be finite.*Give degrees, such as 45"):
+        require_degrees(math.nan, where="net.angle", give="degrees, such as 45")
 
 
 def test_a_name_is_refused_that_is_none_of_those_known_which_are_listed_and_so_is_what_has_no_hash():

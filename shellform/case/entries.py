@@ -25,11 +25,13 @@ from shellform.case.sized import (
     ConcreteDensity,
     Count,
     CountOrNone,
+    Degrees,
     Density,
     Flexural,
     Gap,
     JointMass,
     Kerf,
+    NetAngle,
     NodeForce,
     RodSize,
     Share,
@@ -88,9 +90,7 @@ class NetEntry(Entry):
 
     spacing: Spacing = Field(description="between rods, m")
     spacing_v: Spacing | None = Field(None, description="along the v rods; left out: as along u, m")
-    angle: float | Literal["auto"] = Field(
-        0.0, description="of u rods against the x axis, degrees; auto: with least bending"
-    )
+    angle: NetAngle = Field(0.0, description="of u rods against the x axis, degrees; auto: bent least")
     offset: tuple[float, float] = Field(
         (0.0, 0.0), description="of the net's origin from the middle, spacings; with auto (0, 0) is sought"
     )
@@ -249,10 +249,10 @@ class _SpreadEntry(Entry):
     inside: list[_Polygon] = Field(
         [], description="plan polygons where there is some, m; left out: everywhere"
     )
-    half: float | None = Field(
+    half: Degrees | None = Field(
         None, description="only the half towards this direction in plan, degrees from x"
     )
-    strip: tuple[float, float, float] | None = Field(
+    strip: tuple[Degrees, float, float] | None = Field(
         None, description="only between two places along a direction: degrees, m, m"
     )
     ring: tuple[float, float] | None = Field(None, description="only between two levels, m")
@@ -351,7 +351,6 @@ class OptimiseEntry(Entry):
     polish: CountOrNone = Field(
         20, description="design evaluations for the design polished, without the cables' share; 0: none"
     )
-
     unloaded: bool = Field(
         True,
         description="also make the design without regard to the loads, to compare with (paper, section 4.1)",

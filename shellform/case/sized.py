@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shellform import quantities
-from shellform.errors import InputError, typed
+from shellform.errors import InputError, require_degrees, typed
 from shellform.quantities import FORCES, if_other_unit, newtons, number
+
+
+def _turned(value: float | Literal["auto"]) -> float | Literal["auto"]:
+    """An angle, degrees, or that it is to be sought. Raises InputError for more than a whole turn."""
+    if value != "auto":
+        require_degrees(value, where="", give="degrees, such as 45")
+    return value
+
 
 Spacing = Annotated[PositiveFloat, AfterValidator(quantities.SPACING.require)]
 Gap = Annotated[PositiveFloat, AfterValidator(quantities.GAP.require)]
@@ -28,6 +36,8 @@ JointMass = Annotated[PositiveFloat, AfterValidator(quantities.JOINT_MASS.requir
 NodeForce = Annotated[PositiveFloat, AfterValidator(quantities.NODE_FORCE.require)]
 Axial = Annotated[PositiveFloat, AfterValidator(quantities.AXIAL.require)]
 Flexural = Annotated[PositiveFloat, AfterValidator(quantities.FLEXURAL.require)]
+Degrees = Annotated[float, AfterValidator(_turned)]
+NetAngle = Annotated[float | Literal["auto"], AfterValidator(_turned)]
 PlaceDeviation = Annotated[NonNegativeFloat, AfterValidator(quantities.PLACE_DEVIATION.or_none)]
 
 _MOST = 1_000_000  # drawn structures and design evaluations: a day's work of a large machine, and years' of a small one

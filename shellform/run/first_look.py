@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 from pydantic import ValidationError
 
 import shellform
@@ -19,7 +18,7 @@ from shellform.case.build_rod import rod_material
 from shellform.case.case import SurfaceEntry, load_case
 from shellform.case.entries import Entry, NetEntry
 from shellform.case.wrong_entries import refusal
-from shellform.errors import InputError, require_file
+from shellform.errors import InputError, require_degrees, require_file
 from shellform.gridshell.joints import usual_gap
 from shellform.net.chebyshev import NetSettings
 from shellform.net.cover import patches_told
@@ -226,6 +225,7 @@ def net_alone(
             where=str(folder),
             remedy="Choose another --output for the net alone.",
         )
+    turned = _angle(angle)
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
     for mended in surface.mended:
         report(Event("surface", mended, Kind.NOTE))
@@ -238,7 +238,7 @@ def net_alone(
     refuse_distant(surface)
 
     def pulled(target: Surface) -> tuple[Net, float, tuple[float, float]]:
-        return oriented_net(target, settings, angle=_angle(angle), progress=say)
+        return oriented_net(target, settings, angle=turned, progress=say)
 
     try:
         net, found, offset = pulled(surface)
@@ -266,13 +266,12 @@ def _angle(text: str) -> float | Literal["auto"]:
     if text == "auto":
         return "auto"
     try:
-        angle = float(np.deg2rad(float(text)))
-    except ValueError as error:
-        raise InputError(
-            "must be degrees or auto", where="--angle", value=text, remedy="For example --angle 45."
-        ) from error
-    if not math.isfinite(angle):
+        degrees = float(text)
+    except ValueError:
+        degrees = math.nan
+    if not math.isfinite(degrees):
         raise InputError(
             "must be degrees or auto", where="--angle", value=text, remedy="For example --angle 45."
         )
-    return angle
+    require_degrees(degrees, where="--angle", give="degrees, such as 45, or auto")
+    return math.radians(degrees)

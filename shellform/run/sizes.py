@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shellform import quantities
-from shellform.errors import InputError, require_number
+from shellform.errors import InputError, require_degrees, require_number
 from shellform.gridshell.catalogue import Catalogue, label, named, read_catalogue
 from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.layers import TwoLayers, layers_of, locked_bending
@@ -126,9 +126,11 @@ class DesignWish:
             quantities.THICKNESS.require(self.thickness, where="--thickness")
         if self.spacing is not None:
             quantities.SPACING.require(self.spacing, where="--spacing")
-        if self.angle is not None and not math.isfinite(self.angle):
-            raise InputError(
-                "must be degrees or auto", where="--angle", value=self.angle, remedy="For example --angle 45."
+        if self.angle is not None:
+            require_degrees(
+                self.angle,
+                where="--angle",
+                give="degrees, such as 45, or leave it out for the least bending",
             )
         if self.layers not in (None, 1, 2):
             raise InputError(

@@ -22,6 +22,7 @@ from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
 
 SCALE_MODEL = Path(__file__).parent.parent.parent / "scripts/scale_model.toml"
+DOME = SCALE_MODEL.parent / "dome.toml"
 ROD = {"young": 40e9, "strength": 255e6}
 LINE = [(0.0, 0.0), (1.0, 0.5)]
 TUBE = "needs a radius larger than it"
@@ -74,6 +75,20 @@ def test_guides_are_two_curves_of_two_points_or_more_and_leave_no_angle_to_searc
         assert_refused(NetEntry, said, spacing=0.5, **entries)
         return
     assert NetEntry(spacing=0.5, **entries).guides == entries.get("guides")
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("net.angle=405", "net.angle: 405° is more than a whole turn.*for 405° give 45"),
+        ("net.angle=-1000", "net.angle: .*give -280"),
+        ("part.concrete.half=450", "part.concrete.half: .*give 90"),
+        ("part.concrete.strip=[405, 0.0, 1.0]", r"part.concrete.strip.0: .*give 45"),
+    ],
+)
+def test_angles_of_more_than_a_whole_turn_are_refused_in_degrees_where_the_case_is_read(setting, said):
+    with pytest.raises(InputError, match=said):
+        load_case(DOME, [setting])
 
 
 OPTIMISE = {"misfit_rms_additional": 0.01}

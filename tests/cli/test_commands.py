@@ -398,6 +398,18 @@ def test_an_angle_that_is_no_number_is_refused(tmp_path):
         refused(shellform(*arguments, angle), "--angle: must be degrees or auto")
 
 
+def test_an_angle_beyond_a_whole_turn_is_refused_in_degrees_before_anything_is_read(tmp_path):
+    surface = tmp_path / "none.obj"
+    net = ["net", surface, "--spacing", 0.5, "--output", tmp_path / "net"]
+    for words in (net, ["new", surface, "--output", tmp_path / "case.toml"]):
+        refused(shellform(*words, "--angle", 405), "--angle: 405° is more than a whole turn", "give 45.")
+    refused(
+        shellform("new", surface, "--output", tmp_path / "case.toml", "--angle", "nan"),
+        "--angle: must be finite",
+        "leave it out for the least bending",
+    )
+
+
 @pytest.mark.parametrize(
     ("command", "said"),
     [(name, "is kept, and the same command goes on from there") for name in ("design", "study")]
