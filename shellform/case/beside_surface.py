@@ -23,6 +23,7 @@ from shellform.case.entries import (
     SheetEntry,
 )
 from shellform.case.sized import STRETCHED
+from shellform.case.wrong_loads import refuse_loads
 from shellform.errors import InputError
 from shellform.gridshell.loads import CONCRETE, GRAVITY, as_concrete, refuse_bulk
 from shellform.quantities import (
@@ -49,7 +50,9 @@ _JOINTS = 500.0  # N/m²: as much as 20 mm of concrete
 
 
 def refuse_beside(case: Case, surface: Surface) -> None:
-    """Raises InputError for lengths of the case that no entry on this surface can have."""
+    """Raises InputError for lengths of the case that no entry on this surface can have, and for loads that
+    can't be on any."""
+    refuse_loads(case)
     side = float(surface.size.max())
     for name, part in case.part.items():
         if isinstance(part, ConcreteEntry):

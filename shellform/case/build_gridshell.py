@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from shellform.case.case import (
     Case,
     ConcreteEntry,
     JointsWeightEntry,
+    LoadCaseEntry,
     LoadEntry,
     OwnRodEntry,
     PointsEntry,
@@ -172,8 +173,17 @@ def load_cases(case: Case, shell: Gridshell, surface: Surface) -> dict[str, Real
     if isinstance(entry, LoadEntry):
         design = shell.point_load(entry.force, every=entry.every, openings=entry.openings)
         return {"none": np.zeros_like(design), "design": design, "additional": entry.additional * design}
-    used = {part for each in entry for part in [*each.factors, *each.stages]}
-    parts = {name: _named(name, part, shell, surface) for name, part in case.part.items() if name in used}
+    used = parts_used(entry)
+    return cases_of_parts(entry, {name: _named(name, case.part[name], shell, surface) for name in used})
+
+
+def parts_used(entry: Sequence[LoadCaseEntry]) -> list[str]:
+    """The parts that load cases add up, each once."""
+    return list(dict.fromkeys(part for each in entry for part in [*each.factors, *each.stages]))
+
+
+def cases_of_parts(entry: Sequence[LoadCaseEntry], parts: Mapping[str, Reals]) -> dict[str, Reals]:
+    """As `load_cases`, of the parts by name."""
     found: dict[str, Reals] = {}
     for each in entry:
         where = f"load {each.name!r}"

@@ -18,7 +18,8 @@ from shellform.arrays import Reals
 from shellform.case.build_gridshell import rod_bounds
 from shellform.case.build_safety import case_tolerances, critical_factors_asked
 from shellform.case.case import Case
-from shellform.errors import InputError, NotConverged, require_known
+from shellform.case.wrong_loads import refuse_unknown
+from shellform.errors import InputError, NotConverged
 from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.problem.constraints import AtLeast, AtMost, Constraint
@@ -53,6 +54,7 @@ def case_problem(
     """The problem (2) to (6) of the case on the shell, with its limits; `start` is the initial design. With
     the radius fixed its share goes to the others in proportion, and by the paper's method that of the shape
     as built."""
+    refuse_unknown(case, loads)
     entry = case.optimise
     shares: list[tuple[float, Term]] = [
         (entry.misfit, Misfit("design")),
@@ -81,8 +83,6 @@ def case_problem(
             constraints.append(AtMost(case.robust.limit**2 * shell.node_count, robust))
     used = dict(loads)
     further = {name: factor for name, factor in critical_factors_asked(case).items() if name != "design"}
-    for name in further:
-        require_known(name, others, where="safety.critical_further", what="there is no such load case")
     critical = []
     if further:
         least = _SOFTEST * _stiffness(shell, start, loads["design"])
@@ -146,7 +146,6 @@ def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list
         longest = case.cable.rest_ratio * case.optimise.rest_length_max
         let_out = 0.5 * (1.0 + longest) if longest > 1.0 else np.inf
         for name in entry.slack_loads:
-            require_known(name, loads, where="limits.slack_loads", what="there is no such load case")
             found.append(AtLeast(entry.slack_min, LeastTension(name, entry.slack_min, let_out)))
     return found
 

@@ -34,7 +34,7 @@ from shellform.quantities import (
     if_other_unit,
     number,
 )
-from shellform.structure.elements.sections import Section, mass_per_length
+from shellform.structure.elements.sections import Material, Section, mass_per_length
 from shellform.surface.shape.target import Surface
 
 GRAVITY = 9.81  # m/s²: the paper's 700 g are 6.9 N
@@ -186,12 +186,17 @@ def rods(net: Net, section: Section) -> Reals:
 
     It is the weight of this section: where the radius is a variable the load stays that of the section given.
     """
-    if not section.material.density > 0.0:
-        raise InputError("the rods' density isn't known", where="rod.density", remedy="Give it in kg/m³.")
+    require_density(section.material)
     half = 0.5 * GRAVITY * mass_per_length(section) * net.grid.rod_rest_lengths
     weight = np.zeros(net.node_count)
     np.add.at(weight, net.grid.rod_ends, half[:, None])
     return _down(weight)
+
+
+def require_density(material: Material) -> None:
+    """Raises InputError where the density of what rods are made of isn't known, and so their weight."""
+    if not material.density > 0.0:
+        raise InputError("the rods' density isn't known", where="rod.density", remedy="Give it in kg/m³.")
 
 
 def joints(net: Net, mass: float) -> Reals:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -12,13 +12,15 @@ from typing import Any, Literal
 from pydantic import ValidationError
 
 import shellform
-from shellform.case.beside_surface import refuse_beside
+from shellform.case.beside_surface import doubts, refuse_beside
 from shellform.case.build_net import net_record, refuse_distant, size_text, surface_of, surface_record
-from shellform.case.build_rod import rod_material
-from shellform.case.case import SurfaceEntry, load_case
+from shellform.case.build_rod import given_section, rod_material
+from shellform.case.case import Case, SurfaceEntry, load_case
 from shellform.case.entries import Entry, NetEntry
 from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError, require_degrees, require_file
+from shellform.gridshell.gridshell import Joint, Rod
+from shellform.gridshell.joints import doubts as joint_doubts
 from shellform.gridshell.joints import usual_gap
 from shellform.net.chebyshev import NetSettings
 from shellform.net.cover import patches_told
@@ -57,7 +59,8 @@ class Expected:
 class FirstLook:
     """What a surface is: its record, the file's `format` and `unit`, its largest curvature, 1/m, and the
     largest radius, m, of rods bent to that by equation (1) (None: any), from which the net's may
-    differ either way; of a case what to expect of its net."""
+    differ either way; of a case what to expect of its net, and its `doubts`: what may have been given in
+    another unit, a sentence each."""
 
     surface: SurfaceRecord
     format: str
@@ -65,13 +68,16 @@ class FirstLook:
     curvature_max: float
     rod_radius_max: float | None
     expected: Expected | None = None
+    doubts: tuple[str, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """As JSON says it: the surface's keys stand beside the others."""
         found: dict[str, Any] = plain(self.surface)
         found |= {"format": self.format, "unit": self.unit, "curvature_max": self.curvature_max}
         found |= {"rod_radius_max": self.rod_radius_max}
-        return found | ({} if self.expected is None else {"expected": plain(self.expected)})
+        if self.expected is None:
+            return found
+        return found | {"expected": plain(self.expected), "doubts": list(self.doubts)}
 
 
 def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -> FirstLook:
@@ -100,7 +106,17 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
         curvature_max=bent,
         rod_radius_max=largest_radius(young, strength, bent),
         expected=None if case is None else expected(surface, case.net),
+        doubts=() if case is None else (*doubts(case, surface), *_of_joints(case)),
     )
+
+
+def _of_joints(case: Case) -> Iterator[str]:
+    """What of the joints doesn't fit rods whose size is given."""
+    section, given = given_section(case.rod), case.joint
+    if section is not None:
+        joint = Joint(given.axial, given.torsion, given.bending, given.gap)
+        for doubt in joint_doubts(joint, Rod(section)):
+            yield f"{doubt.told()}."
 
 
 def expected(surface: Surface, net: NetEntry) -> Expected:
@@ -141,7 +157,7 @@ def labelled(found: FirstLook) -> dict[str, str]:
     lines["largest rod radius"] = (
         "any" if largest is None else f"about {number(largest)} m ({source}; the net decides)"
     )
-    return lines
+    return lines | {f"doubt {k}": text for k, text in enumerate(found.doubts, 1)}
 
 
 def labelled_net(found: Summary) -> dict[str, str]:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shellform.case.beside_surface import refuse_beside
 from shellform.case.build_gridshell import gridshell, rod_bounds, rod_limits, rod_of
 from shellform.case.build_rod import given_section
 from shellform.case.case import dump_case, load_case
@@ -235,6 +236,45 @@ def test_loads_that_do_not_fit_the_net_are_named(tmp_path, net, vault, old, new,
     assert old in text
     with pytest.raises(InputError, match=said):
         gridshell(read(tmp_path, text.replace(old, new, 1)), net, vault)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("density = 2000.0\nstrength", "strength", "part.rods: rod.density"),
+        (
+            "factors = { wet = 1.0, rods = 1.0, joints = 1.0, cloth = 1.0 }",
+            "factors = { wet = 0.0 }",
+            "'design': weighs nothing",
+        ),
+        ("factors = { foot = 1.0, band = 1.0, tip = 2.0 }", "", "load 'rest': names no part"),
+        ('name = "rest"', 'name = "pour 1"', "a stage has the name of another case"),
+        (
+            "[cable]",
+            '[limits]\nslack_min = 1.0\nslack_loads = ["pour"]\n[cable]',
+            "slack_loads.*'pour'.*pour 2",
+        ),
+        ("[cable]", "[safety.critical_further]\nstorm = 1.2\n[cable]", "critical_further.*'storm'.*Known"),
+    ],
+)
+def test_loads_that_can_t_be_on_any_net_are_refused_before_there_is_one(tmp_path, vault, old, new, said):
+    text = with_loads()
+    refuse_beside(read(tmp_path, text), vault)
+    assert old in text
+    with pytest.raises(InputError, match=said):
+        refuse_beside(read(tmp_path, text.replace(old, new, 1)), vault)
+
+
+def test_parts_of_which_one_takes_another_s_weight_off_are_loads_as_long_as_something_weighs(tmp_path, vault):
+    """A factor below 0 is no reason for a refusal before the parts are weighed."""
+    text = with_loads().replace("wet = 1.0, rods = 1.0, joints = 1.0", "wet = 1.0, west = -1.0")
+    refuse_beside(read(tmp_path, text), vault)
+
+
+def test_the_weight_of_rods_may_be_unknown_where_no_load_has_it(tmp_path, vault):
+    text = with_loads().replace("density = 2000.0\nstrength", "strength")
+    text = text.replace("rods = 1.0, ", "").replace("{ rods = 1.0 }", "{}")
+    refuse_beside(read(tmp_path, text), vault)
 
 
 def test_rods_that_do_not_fit_are_named(tmp_path, net, vault):

@@ -532,3 +532,28 @@ def test_a_design_that_does_not_hold_ends_with_status_3_and_has_its_page(tmp_pat
     assert "The optimised design does not hold" in result.stdout
     kept = shellform(*arguments)
     assert kept.returncode == 3, "what was kept is judged as before"
+
+
+def test_check_tells_what_design_doubts_when_it_begins_and_ends_well(tmp_path):
+    text = (ROOT / "scripts/dome.toml").read_text(encoding="utf-8")
+    text = text.replace("../surfaces", (ROOT / "surfaces").as_posix())
+    case = tmp_path / "case.toml"
+
+    def checked(old, new, *words):
+        assert old in text
+        case.write_text(text.replace(old, new, 1), encoding="utf-8")
+        found = shellform("check", case, *words)
+        assert found.returncode == 0, found.stderr
+        return found.stdout
+
+    dense = ('kind = "concrete"', 'kind = "concrete"\ndensity = 25000')
+    meant = "part.concrete.density is 25000 kg/m³: 10 times what concrete has"
+    assert meant in checked(*dense)
+    (doubt,) = json.loads(checked(*dense, "--json"))["doubts"]
+    assert doubt.startswith(meant)
+    begun = shellform("design", case, "--until", "surface", "--output", tmp_path / "run")
+    assert doubt in begun.stderr
+    assert "less than the" in checked("rest_ratio = 0.9971", "rest_ratio = 0.9")
+    assert "joint.bending is 5" in checked("[cable]", "[joint]\nbending = 5.0\n[cable]")
+    assert "doubt" not in checked("[cable]", "[cable]")
+    assert json.loads(checked("[cable]", "[cable]", "--json"))["doubts"] == []
