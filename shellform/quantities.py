@@ -134,6 +134,14 @@ EDGE_SIZE: Final = Quantity(
     (1e-4, 1.5),
     MILLIMETRES,
 )
+SECTION_SIZE: Final = Quantity(
+    "every beam's radius, thickness, width or height is",
+    "m",
+    "metres, such as 0.0012",
+    (1e-5, 2.0),
+    (1e-4, 1.5),
+    MILLIMETRES,
+)
 DIAMETER: Final = Quantity(
     "every rod's diameter, wall, width or height is",
     "m",

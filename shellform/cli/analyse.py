@@ -76,7 +76,7 @@ def analyse(
                 ),
             )
         document = result(analysis, sections=known)
-    for warning in analysis.warnings:
+    for warning in document["warnings"]:
         print(f"shellform: note: {warning}", file=sys.stderr)
     text = json.dumps(document, allow_nan=False)
     if output is None:

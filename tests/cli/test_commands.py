@@ -117,6 +117,20 @@ def test_the_way_to_an_example_is_told_as_a_shell_takes_it(tmp_path):
     assert f"\n  cd '{place}'\n" in told
 
 
+def test_analyse_tells_of_a_section_that_isn_t_the_model_s_in_its_result_and_on_the_terminal(tmp_path):
+    sections, model = tmp_path / "rods.toml", model_file(tmp_path)
+    table = "[rod]\nshape = 'round'\nradius = {}\nyoung = 40e9\nshear = 15e9\nstrength = 255e6\n"
+    sections.write_text(table.format(0.5), encoding="utf-8")
+    result = shellform("analyse", model, "--load", "tip", "--sections", sections)
+    assert result.returncode == 0, result.stderr
+    (warning,) = json.loads(result.stdout)["warnings"]
+    assert "beams of kind 'rod' resist with EA" in warning
+    assert f"shellform: note: {warning}" in result.stderr
+    sections.write_text(table.format(4), encoding="utf-8")
+    ended = shellform("analyse", model, "--load", "tip", "--sections", sections)
+    refused(ended, "[rod].radius: must be between", "For 4 mm write 0.004.")
+
+
 def test_analyse_asks_for_the_case_where_there_are_several(tmp_path):
     refused(shellform("analyse", model_file(tmp_path)), "several load cases", "tip, side")
     refused(shellform("analyse", model_file(tmp_path), "--load", "top"), "no such load case")

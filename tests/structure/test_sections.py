@@ -1,17 +1,20 @@
 """Cross-sections, their derivatives, stresses and the sensitivities that use them."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from shellform.errors import InputError
+from shellform.quantities import newtons, number
 from shellform.structure.answers.results import (
     elongation,
     end_stress,
     end_stress_by_force,
     energy_by_kind,
     read_sections,
+    stiffness_doubts,
     twist,
     utilisation,
 )
@@ -138,6 +141,50 @@ def test_section_files_are_read(tmp_path):
         encoding="utf-8",
     )
     assert read_sections(file)["rod"] == Tube(0.02, 0.003, Material(40e9, 4e9, 0.0, 2e8))
+
+
+@pytest.mark.parametrize(
+    ("entry", "given", "write"),
+    [
+        ("radius", "4", "For 4 mm write 0.004."),
+        ("thickness", "3", "For 3 mm write 0.003."),
+        ("young", "40", "For 40 GPa write 4e10."),
+        ("shear", "15e3", "For 15000 MPa write 1.5e10."),
+        ("strength", "255", "For 255 MPa write 2.55e8."),
+        ("density", "2.0", "For 2 t/m³ write 2000."),
+    ],
+)
+def test_sections_in_another_unit_are_refused_with_the_number_to_write(tmp_path, entry, given, write):
+    usual = {"radius": "0.02", "thickness": "0.003", "young": "40e9", "shear": "4e9", "density": "0"}
+    file = tmp_path / "sections.toml"
+
+    def read(entries):
+        lines = "".join(f"{name} = {value}\n" for name, value in {**usual, **entries}.items())
+        file.write_text(f"[rod]\nshape = 'tube'\n{lines}", encoding="utf-8")
+        return read_sections(file)["rod"]
+
+    with pytest.raises(InputError, match=rf"\[rod\]\.{entry}: must be between") as told:
+        read({entry: given})
+    assert write in told.value.remedy
+    read({entry: re.search(r"write (\S+)\.", write)[1]})
+
+
+def test_sections_that_resist_in_another_way_than_the_model_s_beams_are_told():
+    network, _, section = frame()
+    for times, told in ((1.0, ()), (1.012, ()), (0.988, ()), (1.014, ("EIy", "EIz")), (1.03, ("EA", "EIy"))):
+        found = stiffness_doubts(network.beams, {"rod": Round(times * 0.012, GFRP)})
+        assert len(found) == bool(told)
+        for name in told:
+            assert name in found[0]
+    (doubt,) = stiffness_doubts(network.beams, {"rod": Round(2.0 * 0.012, GFRP)})
+    axial, _, bending, _ = stiffness(section)
+    assert doubt.startswith("beams of kind 'rod' resist with EA ")
+    assert f"EIy {number(bending)} N·m², EIz {number(bending)} N·m² in the model" in doubt
+    assert f"their section with EA {newtons(4.0 * axial)}, EIy {number(16.0 * bending)} N·m²" in doubt
+    joint = network.beams.kinds.index("connector")
+    assert joint == 1
+    (doubt,) = stiffness_doubts(network.beams, {"rod": section, "connector": section})
+    assert doubt.startswith("beams of kind 'connector'")
 
 
 def frame(radius=0.012, connector=50.0, ratio=0.98):

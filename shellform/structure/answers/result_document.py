@@ -10,7 +10,14 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.structure.answers.analysis import Analysis
-from shellform.structure.answers.results import elongation, end_stress, energy_by_kind, twist, utilisation
+from shellform.structure.answers.results import (
+    elongation,
+    end_stress,
+    energy_by_kind,
+    stiffness_doubts,
+    twist,
+    utilisation,
+)
 from shellform.structure.elements.sections import Section
 
 
@@ -57,6 +64,7 @@ def result(analysis: Analysis, *, sections: Mapping[str, Section] | None = None)
                 where="--sections",
                 remedy=f"It has: {', '.join(network.beams.kinds)}.",
             )
+        document["warnings"] = [*analysis.warnings, *stiffness_doubts(network.beams, sections)]
         document["stresses"] = _numbers(end_stress(network.beams, forces, sections))
         document["utilisation"] = _numbers(utilisation(network.beams, forces, sections))
     if analysis.modes is not None:

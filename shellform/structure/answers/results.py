@@ -13,6 +13,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError, require_known, unreadable
+from shellform.quantities import DENSITY, SECTION_SIZE, SHEAR, STRENGTH, YOUNG, newtons, number
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.sections import (
@@ -22,6 +23,7 @@ from shellform.structure.elements.sections import (
     isotropic,
     make_section,
     sizes_of,
+    stiffness,
     stress,
     stress_by_force,
 )
@@ -29,6 +31,8 @@ from shellform.structure.elements.state import State
 from shellform.structure.network import Network
 
 _MATERIAL = ("young", "shear", "poisson", "density", "strength")
+_POSSIBLE = {"young": YOUNG, "shear": SHEAR, "density": DENSITY, "strength": STRENGTH}
+_OFF = 0.05  # of a section's stiffness, by which a model's may differ: sizes are rounded
 
 
 def end_stress(beams: Beams, forces: Reals, sections: Mapping[str, Section]) -> Reals:
@@ -102,6 +106,30 @@ def energy_by_kind(network: Network, state: State) -> dict[str, dict[str, float]
     return result
 
 
+def stiffness_doubts(beams: Beams, sections: Mapping[str, Section]) -> tuple[str, ...]:
+    """Where sections resist in another way than the model's beams of their kind, a sentence each: stresses
+    come of the forces that these bear and of the sizes that those have."""
+    told = []
+    for kind, section in sections.items():
+        own, meant = beams.of_kind(kind), stiffness(section)
+        there, here = list[str](), list[str]()
+        for name, value, given in (
+            ("EA", meant.axial, beams.axial),
+            ("EIy", meant.bending_y, beams.bending_y),
+            ("EIz", meant.bending_z, beams.bending_z),
+        ):
+            farthest = max(given[own].tolist(), key=lambda each: abs(each - value), default=value)
+            if abs(farthest - value) > _OFF * value:
+                for found, each in ((there, farthest), (here, value)):
+                    found.append(f"{name} {newtons(each) if name == 'EA' else f'{number(each)} N·m²'}")
+        if there:
+            told.append(
+                f"beams of kind {kind!r} resist with {', '.join(there)} in the model, their section with {', '.join(here)}: "
+                "stresses and utilisation come of both. Is the unit right?"
+            )
+    return tuple(told)
+
+
 def read_sections(path: str | Path) -> dict[str, Section]:
     """Sections by kind of beam from a TOML file: a table for each kind with `shape` (round, tube or
     rectangle), its sizes in m, `young` in Pa, `shear` in Pa or `poisson`, and optionally `density`, kg/m³,
@@ -148,6 +176,11 @@ def _section(table: object, where: str) -> Section:
             where=where,
             remedy="Keep one: each follows from young and the other.",
         )
+    for name, value in table.items():
+        possible = SECTION_SIZE if name in sizes else _POSSIBLE.get(name)
+        if possible is not None:
+            least = 0.0 if name == "density" else None
+            possible.require(float(value), where=f"{where}.{name}", least=least)
     known = {name: float(table[name]) for name in ("density", "strength") if name in table}
     if "shear" in table:
         material = Material(float(table["young"]), float(table["shear"]), **known)
