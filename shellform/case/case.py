@@ -176,8 +176,10 @@ def read_toml(file: Path) -> dict[str, Any]:
         ) from error
 
 
-def make_case(data: Mapping[str, Any], file: Path) -> Case:
-    """As `load_case`, from the tables of a file that are read already."""
+def make_case(data: Mapping[str, Any], file: Path, *, where: str = "") -> Case:
+    """As `load_case`, from the tables of a file that are read already. Refusals name the file, or where else
+    (`where`) what is wrong stands."""
+    where = where or str(file)
     if "surface" not in data and isinstance(data.get("case"), str):
         raise InputError(
             f"is a study of the case {data['case']}, no case",
@@ -185,9 +187,18 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
             remedy=f"Run it by shellform study, or name {data['case']} itself.",
         )
     try:
-        case = Case.model_validate(with_joint(with_present_names(data), file))
+        case = Case.model_validate(with_joint(with_present_names(data), file, where=where))
     except ValidationError as error:
-        raise refusal(error, Case, str(file), follows={"joint": "rod"}) from error
+        raise refusal(error, Case, where, follows={"joint": "rod"}) from error
+    try:
+        return case.model_copy(update=_found_files(case, file))
+    except InputError as error:
+        raise error.within(where) from error
+
+
+def _found_files(case: Case, file: Path) -> dict[str, Any]:
+    """The tables that name files, with these by their absolute paths. Raises InputError for names of none,
+    and for sections that a catalogue hasn't got."""
     name = case.surface.file
     if "\0" in name or max(len(part.encode()) for part in ("", *Path(name).parts)) > _NAME:
         raise InputError(
@@ -203,7 +214,7 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
     }
     if case.edges.beam.catalogue is not None and case.edges.beam.section is not None:
         source = _found_catalogue(case.edges.beam.catalogue, file)
-        named(read_catalogue(source), case.edges.beam.section)
+        named(read_catalogue(source), case.edges.beam.section, where="edges.beam.section")
         beam = case.edges.beam.model_copy(update={"catalogue": source})
         found["edges"] = case.edges.model_copy(update={"beam": beam})
     if case.optimise.catalogue is not None:
@@ -216,12 +227,12 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
         if case.rod.section is not None:
             named(stock, case.rod.section)
         found["rod"] = case.rod.model_copy(update={"catalogue": source})
-    return case.model_copy(update=found)
+    return found
 
 
-def with_joint(data: Mapping[str, Any], file: Path) -> Mapping[str, Any]:
+def with_joint(data: Mapping[str, Any], file: Path, *, where: str = "") -> Mapping[str, Any]:
     """The tables of a case file with what [joint] leaves out as fits the rods; as they are where these are
-    refused. Raises InputError where their size isn't given."""
+    refused. Raises InputError where their size isn't given, naming the file or `where` they stand instead."""
     given = data.get("joint", {})
     missing = [name for name in JointEntry.model_fields if isinstance(given, Mapping) and name not in given]
     if not missing:
@@ -232,11 +243,14 @@ def with_joint(data: Mapping[str, Any], file: Path) -> Mapping[str, Any]:
         return data  # what is wrong with the rods is told first
     if isinstance(rod, StockRodEntry):
         rod = rod.model_copy(update={"catalogue": _found_catalogue(rod.catalogue, file)})
-    section = given_section(rod)
+    try:
+        section = given_section(rod)
+    except InputError as error:
+        raise error.within(where or str(file)) from error
     if section is None:
         raise InputError(
             f"{', '.join(missing)} can't follow the rods, whose size is left out",
-            where=f"{file}: joint",
+            where=f"{where or file}: joint",
             remedy="Give the rods' size (rod.radius, rod.width and rod.height, or rod.section), or the joint in full.",
         )
     fitting = following(Rod(section))

@@ -185,14 +185,14 @@ def label(section: Section, places: int = 6) -> str:
     return " × ".join(mm(size) for size in section.sizes) + " mm"
 
 
-def named(catalogue: Catalogue, name: str) -> Section:
-    """The catalogue's section of that label. Raises InputError naming all of them."""
+def named(catalogue: Catalogue, name: str, *, where: str = "rod.section") -> Section:
+    """The catalogue's section of that label, which stands `where`. Raises InputError naming all of them."""
     found = {_plain(label(section)): section for section in catalogue.sections}
     if _plain(name) not in found:
         known = ", ".join(label(section) for section in catalogue.sections)
         raise InputError(
             f"is not in the catalogue {catalogue.title!r}",
-            where="rod.section",
+            where=where,
             value=name,
             remedy=f"Known: {known}.",
         )

@@ -95,7 +95,10 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
     path = Path(entry.file)
     surface = surface_of(entry, allow_scripts=allow_scripts)
     if case is not None:
-        refuse_beside(case, surface)
+        try:
+            refuse_beside(case, surface)
+        except InputError as error:
+            raise error.within(str(file)) from error
     bent = largest_curvature(surface)
     material = rod_material(case.rod) if case else None
     young, strength = (material.young, material.strength) if material else (YOUNG, STRENGTH)

@@ -337,14 +337,31 @@ def resolved(plan: Plan, own: Mapping[str, Value]) -> tuple[Case, dict[str, Valu
             return value
         rods = {each: value for each, value in given.items() if each.startswith("rod.")}
         follow = [each for each in study.function if each.startswith("rod.")]
-        tables = _tables(plan, rods | {each: _as_the_base(plan, each, entry(each)) for each in follow})
-        fitting = _value_of(with_joint(tables, case), name)
+        entries = rods | {each: _as_the_base(plan, each, entry(each)) for each in follow}
+        fitting = _value_of(with_joint(_tables(plan, entries), case, where=str(plan.file)), name)
         if fitting is None:
-            make_case(tables, case)  # says what is wrong with the rods
+            _made(plan, entries, own)  # says what is wrong with the rods
         return fitting
 
     follow = {name: _as_the_base(plan, name, entry(name)) for name in study.function}
-    return make_case(_tables(plan, {**given, **follow}), case), {**own, **follow}
+    return _made(plan, {**given, **follow}, own), {**own, **follow}
+
+
+def _made(plan: Plan, entries: Mapping[str, Value], own: Mapping[str, Value]) -> Case:
+    """The base case with entries in place of its own. What is wrong with it stands in the study, for the case
+    itself isn't refused: a refusal names the first of its tables with which it is."""
+    file, study = plan.file.parent / plan.study.case, plan.study
+    try:
+        return make_case(_tables(plan, entries), file)
+    except InputError:
+        listed = {name for name in own if any(name in each for each in study.designs)}
+        names = {"[set]": study.set, "[vary]": own.keys() - listed, "[[designs]]": listed}
+        taken: set[str] = set()
+        for table, more in names.items():
+            taken |= set(more)
+            where = f"{plan.file}: {table}"
+            make_case(_tables(plan, {k: v for k, v in entries.items() if k in taken}), file, where=where)
+        return make_case(_tables(plan, entries), file, where=f"{plan.file}: [function]")
 
 
 def _tables(plan: Plan, entries: Mapping[str, Value]) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import pytest
 from shellform.case.beside_surface import doubts, refuse_beside
 from shellform.case.case import load_case
 from shellform.errors import InputError
+from shellform.run.first_look import check_file
 from shellform.surface.readers.reading import read_surface
 
 ROOT = Path(__file__).parent.parent.parent
@@ -285,3 +286,26 @@ def test_a_gap_as_wide_as_half_the_spacing_is_refused():
     assert re.search(r"joint.gap: must be well below net.spacing \(0.055 m\)", told(VAULT, "joint.gap=0.1"))
     assert "rods more than 0.056 m apart (net.spacing)" in told(VAULT, "rod.radius=0.014", "joint.gap=0.028")
     load_case(VAULT, ["rod.radius=0.014", "joint.gap=0.028", "net.spacing=0.0561"])
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("rod.section=51 mm", "rod.section: is not in the catalogue"),
+        ('edges.beam={catalogue = "edge_tubes", section = "51 mm"}', "edges.beam.section: is not in the"),
+        ("rod.catalogue=bamboo", "catalogue "),
+        ("surface.file=" + 300 * "a", "surface.file: is no file's name"),
+    ],
+)
+def test_names_of_nothing_are_refused_with_the_case_file_in_which_they_stand(setting, said):
+    assert told(DOME, setting).startswith(f"{DOME}: {said}")
+    assert told(DOME, "joint.gap=0.002", setting).startswith(f"{DOME}: {said}")
+
+
+def test_what_can_t_be_on_the_surface_is_refused_by_check_with_the_case_file(tmp_path):
+    text = DOME.read_text(encoding="utf-8").replace("../surfaces", (ROOT / "surfaces").as_posix())
+    file = tmp_path / "case.toml"
+    file.write_text(text.replace("thickness = 0.011", "thickness = 0.5"), encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        check_file(file, {}, allow_scripts=False)
+    assert str(refused.value).startswith(f"{file}: part.concrete.thickness: makes a block")

@@ -391,3 +391,25 @@ def test_an_expression_may_have_500_characters():
     assert worth("1+" * 249 + "1 ") == 250.0
     with pytest.raises(InputError, match="longer than 500 characters"):
         worth("1+" * 250 + "1")
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ("[vary]\nnet.spaceing = [0.05, 0.06]", r"[vary]: net.spaceing is no known entry"),
+        ("[vary]\nnet.spacing = [60, 70]", r"[vary]: net.spacing: must be between"),
+        ("[set]\nnet.elements = 1000\n[vary]\nnet.spacing = [0.05]", r"[set]: net.elements"),
+        ("[[designs]]\nrod.radius = 0.0\n[vary]\nnet.spacing = [0.05]", r"[[designs]]: rod.radius"),
+        ('[vary]\nnet.spacing = [0.05]\n[function]\njoint.gap = "net.spacing"', r"[function]: joint.gap"),
+        ("[set]\nnet.elements = 2\n[vary]\nrod.radius = [-1.0]", r"[vary]: rod.radius"),
+        (
+            '[set]\nedges.beam = {catalogue = "edge_tubes", section = "9 mm"}',
+            "[set]: edges.beam.section: is not in",
+        ),
+    ],
+)
+def test_a_study_s_wrong_entry_is_told_with_its_file_and_table(tmp_path, tables, said):
+    file = study_file(tmp_path, tables)
+    with pytest.raises(InputError) as refused:
+        read_study(file)
+    assert str(refused.value).startswith(f"{file}: {said}")
