@@ -14,7 +14,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shellform.errors import Damaged, InputError
+from shellform.errors import ANEW, Damaged, InputError
 
 Reals = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -169,9 +169,7 @@ class Arrays(dict[str, Any]):
         self.path = path
 
     def __missing__(self, name: str) -> Any:
-        raise Damaged(
-            f"is damaged: {name} is missing", where=str(self.path), remedy="Run again with --fresh."
-        )
+        raise Damaged(f"is damaged: {name} is missing", where=str(self.path), remedy=ANEW)
 
 
 def read_arrays(path: Path) -> Arrays:
@@ -179,7 +177,7 @@ def read_arrays(path: Path) -> Arrays:
     damaged.
     """
     if not path.is_file():
-        raise InputError("isn't there", where=str(path), remedy="Run again with --fresh.")
+        raise InputError("isn't there", where=str(path), remedy=ANEW)
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
             return Arrays(path, {name: data[name] for name in data.files})
@@ -196,7 +194,7 @@ def read_arrays(path: Path) -> Arrays:
         cause: Exception = error
     except (KeyError, OverflowError, SyntaxError, zipfile.BadZipFile, zlib.error) as error:
         cause = error
-    raise Damaged(f"is damaged: {cause}", where=str(path), remedy="Run again with --fresh.") from cause
+    raise Damaged(f"is damaged: {cause}", where=str(path), remedy=ANEW) from cause
 
 
 def _shaped(name: str, raw: NDArray[_T], shape: Shape) -> NDArray[_T]:

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+ANEW = "Make it anew: shellform design CASE.toml --output RUN --fresh."
 STOPPED = 130  # exit status after Ctrl-C: 128 and the number of its signal
 _WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-9)  # rad
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import read_arrays
-from shellform.errors import InputError
+from shellform.errors import ANEW, InputError
 from shellform.net.cover import BarePatch, Cover
 from shellform.net.grid import Grid, GridRod
 from shellform.net.net import EdgeLine, Net, Stretch
@@ -160,7 +160,7 @@ def load_net(path: Path) -> Net:
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:
-        raise InputError(f"is damaged: {error}", where=str(path), remedy="Run again with --fresh.") from error
+        raise InputError(f"is damaged: {error}", where=str(path), remedy=ANEW) from error
 
 
 def _row(attempt: Attempt) -> list[Any]:

@@ -16,9 +16,8 @@ from typing import Any, TypeVar, cast
 
 from pydantic import TypeAdapter, ValidationError
 
-from shellform.errors import Damaged, InputError, unreadable
+from shellform.errors import ANEW, Damaged, InputError, unreadable
 
-ANEW = "Run again with --fresh."
 _T = TypeVar("_T")
 
 

@@ -6,9 +6,8 @@ import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from shellform.errors import Damaged
+from shellform.errors import ANEW, Damaged
 from shellform.optimiser.optimum import Step, by_constraint
-from shellform.records.files import ANEW
 from shellform.tables import Table, table_text
 from shellform.written import write_text
 

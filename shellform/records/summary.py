@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from shellform.errors import Damaged, InputError
+from shellform.errors import ANEW, Damaged, InputError
 from shellform.net.cover import BarePatch
 from shellform.net.quality import NetNumbers
 from shellform.records.built_shape import BuiltShapeRecord
 from shellform.records.failures import FailureRecord, RareRecord
-from shellform.records.files import ANEW, names_format, plain, read_record, text_of
+from shellform.records.files import names_format, plain, read_record, text_of
 from shellform.records.optimisation import OptimisationRecord, SectionRecord
 from shellform.records.raising import WayUpRecord
 from shellform.records.scattering import RobustRecord

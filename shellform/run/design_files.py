@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from shellform.arrays import read_arrays, reals
-from shellform.errors import Damaged, InputError
+from shellform.errors import ANEW, Damaged, InputError
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.records.files import ANEW
 from shellform.structure.elements.state import State
 from shellform.written import write_arrays
 

@@ -131,7 +131,7 @@ def test_what_is_not_known_is_left_out_but_for_what_stands_beside_a_number():
 def test_a_key_that_is_missing_or_of_another_type_is_refused_by_its_name(tmp_path, change, words):
     write_summary(tmp_path, summary(NAMES))
     changed(tmp_path, change)
-    with pytest.raises(Damaged, match=rf"summary.json: .*{words}.*--fresh"):
+    with pytest.raises(Damaged, match=rf"summary.json: .*{words}.*shellform design .* --fresh"):
         read_summary(tmp_path)
 
 
