@@ -36,6 +36,11 @@ class RodSizes:
     keeps: bool = False
     least: float = 0.0
 
+    @property
+    def named(self) -> str:
+        """The entries that give the size."""
+        return "rod.section" if self.bought else ", ".join(self.entries)
+
     def at_least(self, wanted: float) -> str | None:
         """What to write for rods as stiff as similar ones of the radius `wanted`, m; None where no catalogue
         has them."""

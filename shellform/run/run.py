@@ -23,6 +23,7 @@ from shellform.arrays import Reals, Record
 from shellform.case.beside_surface import doubts, refuse_beside
 from shellform.case.build_gridshell import gridshell, rod_limits
 from shellform.case.build_net import net_of, net_record, size_text, surface_of, surface_record, with_rods
+from shellform.case.build_rod import rod_sizes
 from shellform.case.case import Case, check_script
 from shellform.errors import InputError, NotConverged, ShellformError, require_file, require_known
 from shellform.gridshell.gridshell import Gridshell, TooCurved
@@ -315,8 +316,8 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
         raise NotConverged(
             "The initial design deforms excessively under the design load "
             f"({1e3 * first.deviation_max:.0f} mm); its states are kept in {workspace.path('states')}",
-            remedy="Choose a denser grid (net.spacing), thicker rods (rod.radius) or stiffer cables "
-            "(cable.stiffness).",
+            remedy="Choose a denser grid (net.spacing), thicker rods "
+            f"({rod_sizes(case.rod, shell.rod).named}) or stiffer cables (cable.stiffness).",
         )
     return _Ended(parts, summary)
 

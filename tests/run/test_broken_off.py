@@ -67,12 +67,18 @@ def test_a_finished_run_whose_changed_case_falls_shows_nothing_of_the_design_bef
 
 def test_a_run_with_a_design_that_deforms_too_much_shows_it_and_says_so_first(tmp_path):
     case = small_case(ROOT, "rod.radius=0.0003", "load.force=20.0")
-    with pytest.raises(NotConverged, match="deforms excessively"):
+    with pytest.raises(NotConverged, match=r"deforms excessively.*thicker rods \(rod\.radius\)"):
         run_case(case, tmp_path / "run")
     page = text_of(tmp_path / "run")
     assert "The initial design does not hold" in page
     verdict = page.index("ended without a result: The initial design deforms excessively")
     assert verdict < page.index("How far off is the shell?")
+
+
+def test_thicker_rods_of_a_catalogue_are_advised_by_the_entry_that_such_a_case_has(tmp_path):
+    case = small_case(ROOT, 'rod={catalogue = "gfrp_rods", section = "1.5 mm"}', "load.force=200.0")
+    with pytest.raises(NotConverged, match=r"deforms excessively.*thicker rods \(rod\.section\)"):
+        run_case(case, tmp_path / "run", until="initial")
 
 
 def test_what_was_found_before_the_end_is_told_in_millimetres_and_degrees():
