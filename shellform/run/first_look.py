@@ -84,14 +84,18 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
     """What a surface file or a case's surface is, in SI units; `options` are the entries of [surface] in a
     case.
 
-    For a case they take the place of its own, and what to expect of its net is said too.
+    Of a case what to expect of its net is said too; it has these entries itself. Raises InputError.
     """
     case = load_case(file) if file.suffix.lower() == ".toml" else None
-    entry = (
-        surface_entry(file, options)
-        if case is None
-        else surface_entry(None, {**case.surface.model_dump(), **options})
-    )
+    if case is not None and options:
+        name, value = next(iter(options.items()))
+        raise InputError(
+            f"is for surface files, and a case says itself how its surface is read: surface.{name}",
+            where=f"--{name.replace('_', '-')}",
+            value=value,
+            remedy=f"Leave it out, or write {name} in [surface] of {file}.",
+        )
+    entry = surface_entry(file, options) if case is None else surface_entry(None, case.surface.model_dump())
     path = Path(entry.file)
     surface = surface_of(entry, allow_scripts=allow_scripts)
     if case is not None:

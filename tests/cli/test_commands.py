@@ -412,6 +412,12 @@ def test_an_angle_that_is_no_number_is_refused(tmp_path):
         refused(shellform(*arguments, angle), "--angle: must be degrees or auto")
 
 
+def test_check_of_a_case_takes_no_option_of_surface_files(tmp_path):
+    case = ROOT / "scripts/dome.toml"
+    refused(shellform("check", case, "--unit", "mm"), "--unit: is for surface files", "surface.unit")
+    refused(shellform("check", case, "--fill-narrower", 1), "--fill-narrower: is", "surface.fill_narrower")
+
+
 def test_an_angle_beyond_a_whole_turn_is_refused_in_degrees_before_anything_is_read(tmp_path):
     surface = tmp_path / "none.obj"
     net = ["net", surface, "--spacing", 0.5, "--output", tmp_path / "net"]
