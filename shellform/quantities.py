@@ -30,6 +30,7 @@ MASSES: Final = {"g": 1e-3}
 """By their names, so much of each in the SI unit."""
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _NEWTONS: Final = ((1e7, "MN", 1e6), (1e3, "kN", 1e3))  # from so many N on, so many N a unit
+_STRETCHED_ONCE = 50.0  # per cent: what is less is no rest length of a cable
 _TWICE = 1e3  # what is lost where a number in the SI unit was taken for one in its thousandth
 
 
@@ -69,6 +70,14 @@ class Quantity:
     def hint(self, value: float) -> str:
         """What to write of a value that was given in another unit."""
         return if_other_unit(value, self.units, *self.usual)
+
+
+def require_rest_ratio(value: float, *, where: str = "") -> float:
+    """The value, rest length over length of a cable that is strained. Raises InputError."""
+    share = isinstance(value, int | float) and value >= _STRETCHED_ONCE  # 1.5 may be 1.5 % of strain
+    give = "rest length over length, a little below 1, such as 0.99"
+    require_number(value, above=0.0, below=1.0, where=where, give=give, share=share)
+    return value
 
 
 def if_other_unit(value: float, units: Mapping[str, float], low: float, high: float) -> str:

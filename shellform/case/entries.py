@@ -33,6 +33,7 @@ from shellform.case.sized import (
     Kerf,
     NetAngle,
     NodeForce,
+    RestRatio,
     RodSize,
     Share,
     Shear,
@@ -192,9 +193,7 @@ class CableEntry(Entry):
     """Bracing cables."""
 
     stiffness: Axial = Field(description="EA, N")
-    rest_ratio: float = Field(
-        0.99, gt=0.0, lt=1.0, description="initial rest length over length in the target"
-    )
+    rest_ratio: RestRatio = Field(0.99, description="initial rest length over length in the target")
     force_max: PositiveFloat = Field(
         description="largest allowed tension before any load and under each, N (constraint 5; by the paper's method under the design load alone); as much as the stiffness limits nothing"
     )

@@ -34,6 +34,7 @@ ConcreteDensity = Annotated[PositiveFloat, AfterValidator(quantities.CONCRETE_DE
 AreaMass = Annotated[PositiveFloat, AfterValidator(quantities.AREA_MASS.require)]
 JointMass = Annotated[PositiveFloat, AfterValidator(quantities.JOINT_MASS.require)]
 NodeForce = Annotated[PositiveFloat, AfterValidator(quantities.NODE_FORCE.require)]
+RestRatio = Annotated[float, AfterValidator(quantities.require_rest_ratio)]
 Axial = Annotated[PositiveFloat, AfterValidator(quantities.AXIAL.require)]
 Flexural = Annotated[PositiveFloat, AfterValidator(quantities.FLEXURAL.require)]
 Degrees = Annotated[float, AfterValidator(_turned)]

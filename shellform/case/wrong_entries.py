@@ -75,7 +75,7 @@ def _if_per_cents(error: Any) -> str:
     """What to write of a share or factor too large that its hundredth would suit: of 97, or "97", 0.97."""
     bounds = error.get("ctx", {})
     bound = bounds.get("lt", bounds.get("le"))
-    if bound is None or bound > _FACTOR:
+    if bound is None or isinstance(bound, int) or bound > _FACTOR:  # nobody counts in per cents
         return ""
     return if_per_cents(float(error["input"]), bound)
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Flags, Indices, Reals, Record, flags, indices, reals
-from shellform.errors import InputError, require_number
+from shellform.errors import InputError
 from shellform.gridshell.candidates import candidate_cables
 from shellform.gridshell.edge_beams import EdgeBeam, edge_beams
 from shellform.gridshell.layers import LOCK, locks, rod_bending_stress, rod_forces, rod_utilisation
@@ -26,7 +26,7 @@ from shellform.gridshell.loads import points
 from shellform.gridshell.possible_rods import refuse_thick, require_section
 from shellform.net.grid import ROD, grid_beams
 from shellform.net.net import Net
-from shellform.quantities import AXIAL, FLEXURAL, GAP, ROD_SIZE
+from shellform.quantities import AXIAL, FLEXURAL, GAP, ROD_SIZE, require_rest_ratio
 from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.sections import (
@@ -227,14 +227,7 @@ class Gridshell(Record):
 
     def design(self, *, rest_ratio: float = 0.99) -> Design:
         """The initial design: every candidate cable at `rest_ratio` of its length in the target."""
-        require_number(
-            rest_ratio,
-            above=0.0,
-            below=1.0,
-            where="cable.rest_ratio",
-            give="a share of the length, such as 0.99",
-            share=True,
-        )
+        require_rest_ratio(rest_ratio, where="cable.rest_ratio")
         every = np.ones(len(self.cable_ends), dtype=bool)
         return Design(rest_ratio * self.cable_lengths, every, self.rod.radius)
 

@@ -391,7 +391,16 @@ def test_shares_and_factors_in_per_cent_are_refused_with_the_number_to_write(set
 
 
 @pytest.mark.parametrize(
-    "setting", ["safety.probability_design=1", "tolerances.load_each=0.6", "load.additional=0.5"]
+    "setting",
+    [
+        "safety.probability_design=1",
+        "tolerances.load_each=0.6",
+        "load.additional=0.5",
+        "cable.rest_ratio=1.5",  # 0.015 would be a cable of 1.5 % of its length
+        "cable.rest_ratio=1",
+        "cable.rest_ratio=0",
+        "net.elements=1000",  # counts have none
+    ],
 )
 def test_no_per_cents_are_read_into_a_share_that_is_only_too_large(setting):
     with pytest.raises(InputError) as refused:

@@ -203,7 +203,7 @@ def test_shares_of_fixed_radii_go_to_the_others(shell, loads):
         (["limits.deviation=0"], "limits.deviation.*greater than 0"),
         (["limits.unloaded_deviation=-1"], "limits.unloaded_deviation.*greater than 0"),
         (["limits.built_deviation=0"], "limits.built_deviation.*greater than 0"),
-        (["cable.rest_ratio=1.0"], "cable.rest_ratio.*less than 1"),
+        (["cable.rest_ratio=1.0"], "cable.rest_ratio: must be positive and below 1"),
         (["safety.probability_design=1.0"], "safety.probability_design.*less than 1"),
         (["safety.probability_additional=1.0"], "safety.probability_additional.*less than 1"),
     ],

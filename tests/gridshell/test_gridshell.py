@@ -64,7 +64,7 @@ def test_a_design_begins_with_every_cable_a_hundredth_shorter_than_in_the_target
     assert shell.design(rest_ratio=0.9).rest_length == pytest.approx([1.8, 2.7, 4.5])
     assert not shell.unbraced().present.any()
     for ratio in (0.0, 1.0, 1.5):
-        with pytest.raises(InputError, match=r"cable\.rest_ratio.*such as 0\.99"):
+        with pytest.raises(InputError, match=r"cable\.rest_ratio.*such as 0\.99\.$"):
             shell.design(rest_ratio=ratio)
 
 
