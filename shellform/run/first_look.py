@@ -253,7 +253,7 @@ def net_alone(
     for mended in surface.mended:
         report(Event("surface", mended, Kind.NOTE))
     report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
-    settings = NetSettings(spacing=spacing, gap=gap or usual_gap(spacing))
+    settings = NetSettings(spacing=spacing, gap=usual_gap(spacing) if gap is None else gap)
 
     def say(text: str) -> None:
         report(Event("net", text))

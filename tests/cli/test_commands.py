@@ -412,6 +412,12 @@ def test_an_angle_that_is_no_number_is_refused(tmp_path):
         refused(shellform(*arguments, angle), "--angle: must be degrees or auto")
 
 
+def test_a_gap_of_nothing_is_refused_and_not_taken_for_one_that_is_left_out(tmp_path):
+    net = ["net", "surfaces/hypar.obj", "--spacing", 0.5, "--output", tmp_path / "net", "--gap"]
+    for gap in (0, -1):
+        refused(shellform(*net, gap), "must be positive", f"found {float(gap)}")
+
+
 def test_check_of_a_case_takes_no_option_of_surface_files(tmp_path):
     case = ROOT / "scripts/dome.toml"
     refused(shellform("check", case, "--unit", "mm"), "--unit: is for surface files", "surface.unit")
