@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shellform.quantities import newtons, number
+from shellform.records.words import exceeds
 from shellform.run.folder import Run
 from shellform.site.erection_steps import Props
 from shellform.structure.elements.state import State
@@ -43,6 +44,23 @@ def broken_told(stage: str, borne: Props | None, tighten_first: bool, every: boo
     elif borne is None:
         helps = "erect --by scaffold, give the supports other --way points"
     return f"rods break {when}: {helps}, or choose thinner or stronger rods"
+
+
+def pulled_told(stage: str, pull: float, most: float, tighten_first: bool) -> list[str]:
+    """That cables pull more than they may, N, most of all in a `stage`, and what helps; nothing where they
+    don't."""
+    if not exceeds(pull, most):
+        return []
+    when, helps = "on the way", ""
+    if stage == "loading":
+        when, helps = "under the load", "give a smaller --load, or "
+    elif stage.startswith("tightening"):
+        when = "as they are tightened"
+    if tighten_first and stage != "loading":
+        helps = "leave --tighten-first out, or "
+    return [
+        f"cables pull up to {newtons(pull)} {when}, more than the {newtons(most)} of cable.force_max: {helps}take stronger ones"
+    ]
 
 
 def scaffold_told(borne: Props) -> str:

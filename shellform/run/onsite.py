@@ -25,7 +25,7 @@ from shellform.errors import (
 )
 from shellform.gridshell.gridshell import Gridshell
 from shellform.quantities import PLACE_DEVIATION, TURN, newtons
-from shellform.run.erection_told import EVERY, broken_told, off_design, scaffold_told
+from shellform.run.erection_told import EVERY, broken_told, off_design, pulled_told, scaffold_told
 from shellform.run.folder import Run, read_run
 from shellform.run.site_sources import design_named, load_named, named_files, scan_under, scanned
 from shellform.site import calibration, erection, measurements, retensioning
@@ -262,6 +262,7 @@ def erect(
         stage=np.array([each.stage for each in done.steps]),
     )
     worst, last = done.worst, done.steps[-1]
+    tight = max(done.steps, key=lambda each: each.tension)
     borne = done.props
     return SiteResult(
         [
@@ -270,7 +271,7 @@ def erect(
             f"largest rod stress {1e-6 * worst.stress:.0f} MPa, {worst.stress / done.strength:.3f} of the "
             f"strength, at {worst.share:.2f} of {worst.stage}; "
             f"{1e-6 * last.stress:.0f} MPa in the end",
-            f"largest cable tension {newtons(max(each.tension for each in done.steps))}, largest force on a "
+            f"largest cable tension {newtons(tight.tension)}, largest force on a "
             f"support {newtons(max(each.reaction for each in done.steps))}",
             *([] if borne is None else [scaffold_told(borne)]),
             *([] if weight else off_design(run, name, load or "none", last.state)),
@@ -279,6 +280,7 @@ def erect(
                 if worst.stress > done.strength
                 else []
             ),
+            *pulled_told(tight.stage, tight.tension, run.case.cable.force_max, tighten_first),
         ],
         files,
     )

@@ -34,7 +34,10 @@ def run(monkeypatch, tmp_path):
         folder=tmp_path, best="polished", designs={"initial": "first", "polished": "last"},
         states={"polished": {"none": moved([0.0, 0.0, 0.01]), "wet": moved([0.0, 0.02, 0.0])}},
         loads={"none": "no load", "wet": "concrete"}, shell_of=lambda name: SHELL,
-        case=SimpleNamespace(surface=SimpleNamespace(origin=(430_000.0, 81_000.0, 400.0))),
+        case=SimpleNamespace(
+            surface=SimpleNamespace(origin=(430_000.0, 81_000.0, 400.0)),
+            cable=SimpleNamespace(force_max=7.5),
+        ),
     )  # fmt: skip
     monkeypatch.setattr(onsite, "read_run", lambda folder: own)
     return own
@@ -183,6 +186,18 @@ def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, 
         steps[1].stage = stage
         again = onsite.erect(tmp_path, load="wet", lift="none", tighten_first=first, step=0.125)
         assert again.lines[-1] == f"rods break {told}, or choose thinner or stronger rods"
+    strength, run.case.cable.force_max = 240e6, 5.0
+    for stage, first, told in [
+        ("loading", True, " under the load{}give a smaller --load, or "),
+        ("lowering", True, " on the way{}leave --tighten-first out, or "),
+        ("tightening group 2", True, " as they are tightened{}leave --tighten-first out, or "),
+        ("tightening", False, " as they are tightened{}"),
+        ("moving", False, " on the way{}"),
+    ]:
+        steps[1].stage = stage
+        again = onsite.erect(tmp_path, load="wet", lift="none", tighten_first=first, step=0.125)
+        words = told.format(", more than the 5 N of cable.force_max: ")
+        assert again.lines[-1] == f"cables pull up to 7.5 N{words}take stronger ones"
     borne = Props(push=9.0, pull=0.0, pulled=0, rope=1.5)
     assert onsite.erect(tmp_path, load="wet", lift="none", step=0.125).lines[3] == (
         "the scaffold pushes crossings up with up to 9 N each and holds none of them down; ropes draw rods' ends in with up to 1.5 N"
