@@ -25,6 +25,7 @@ STRESSES: Final = {"MPa": 1e6, "GPa": 1e9, "kPa": 1e3}
 MODULI: Final = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3}
 DENSITIES: Final = {"t/m³": 1e3, "kN/m³": 1e3 / 9.81, "N/m³": 1.0 / 9.81, "g/m³": 1e-3}
 FORCES: Final = {"kN": 1e3}
+MEGANEWTONS: Final = {"MN": 1e6}
 MILLINEWTONS: Final = {"mN": 1e-3}
 MASSES: Final = {"g": 1e-3}
 """By their names, so much of each in the SI unit."""

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, NonNegativeFloat, NonNegativeInt, Po
 
 from shellform import quantities
 from shellform.errors import InputError, require_degrees, typed
-from shellform.quantities import FORCES, if_other_unit, newtons, number
+from shellform.quantities import FORCES, MEGANEWTONS, if_other_unit, newtons, number
 
 
 def _turned(value: float | Literal["auto"]) -> float | Literal["auto"]:
@@ -54,7 +54,8 @@ def refuse_strain(stiffness: float, force_max: float) -> None:
     """Raises InputError for cables of a stiffness EA, N, that no cable has beside the largest force, N, which
     it is let bear."""
     strain = force_max / stiffness
-    meant = if_other_unit(stiffness, FORCES, force_max, 1e4 * force_max)
+    likely = force_max, 1e4 * force_max
+    meant = if_other_unit(stiffness, FORCES, *likely) or if_other_unit(stiffness, MEGANEWTONS, *likely)
     if strain > STRETCHED and meant:
         raise InputError(
             f"lets cables pull {newtons(force_max)}, at which they would be {number(1.0 + strain)} times as long",

@@ -58,6 +58,7 @@ def meant(said):
         (DOME, "rod.stock_length", "0.006", 6.0),
         (DOME, "joint.gap", "2.4", 0.0024),
         (DOME, "cable.stiffness", "17.9", 17900.0),
+        (DOME, "cable.stiffness", "0.0179", 17900.0),
         (VAULT, "cable.stiffness", "0.187", 187.0),
         (DOME, "cable.force_max", "0.103", 103.0),
         (DOME, "cable.adjustment", "20", 0.02),
