@@ -106,6 +106,7 @@ def test_an_initial_design_that_comes_off_by_a_tenth_of_the_span_or_snaps_throug
     monkeypatch.setattr(module, "rod_limits", lambda *_: SimpleNamespace(radius_max=1.0))
     monkeypatch.setattr(module, "with_rods", lambda record, rods: record)
     monkeypatch.setattr(module, "joint_doubts", lambda *_: [])
+    monkeypatch.setattr(module, "rod_sizes", lambda *_: SimpleNamespace(named="rod.section"))
     monkeypatch.setattr(module.designs, "forget", lambda folder, names, so_far: so_far)
     monkeypatch.setattr(module.designs, "followed", lambda *_: {})
     monkeypatch.setattr(module.designs, "keep", keep)
@@ -129,8 +130,9 @@ def test_an_initial_design_that_comes_off_by_a_tenth_of_the_span_or_snaps_throug
         module._initial(workspace, parts, given, keep=True)
         assert len(kept) == 3
         return
-    with pytest.raises(NotConverged, match=f"{1e3 * deviation:.0f} mm"):
+    with pytest.raises(NotConverged, match=f"{1e3 * deviation:.0f} mm") as refused:
         module._initial(workspace, parts, given, keep=False)
+    assert "thicker rods (rod.section)" in refused.value.remedy
 
 
 def test_a_net_that_is_refused_is_to_be_rounded_to_three_of_its_spacings(monkeypatch, tmp_path):
