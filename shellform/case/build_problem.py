@@ -104,8 +104,7 @@ def case_problem(
 
 def cable_force_planned(case: Case) -> float:
     """N, that a cable may pull as planned: what `limits.cable_utilisation` leaves of `cable.force_max`."""
-    share = case.limits.cable_utilisation
-    return case.cable.force_max * (1.0 if share is None else share)
+    return case.limits.cable_utilisation * case.cable.force_max
 
 
 def varied(case: Case, shell: Gridshell, *, frees_radius: bool = True) -> list[Variable]:

@@ -30,10 +30,8 @@ class LimitsEntry(Entry):
         le=BROKEN,
         description="largest fibre stress of the rods over their strength, erection stress included",
     )
-    cable_utilisation: PositiveFloat | None = Field(
-        None,
-        le=1.0,
-        description="largest pull of a cable over cable.force_max as planned; left out: all of it",
+    cable_utilisation: PositiveFloat = Field(
+        1.0, le=1.0, description="largest pull of a cable over cable.force_max, as planned"
     )
     connector_turn: PositiveFloat | None = Field(
         None, description="of two crossing rods against each other from the flat grid, rad"

@@ -158,17 +158,18 @@ def limited(rows: Mapping[str, DesignRecord], rods: Mapping[str, RodsOf], bounds
             "N",
         ),
     ]
+    planned = bounds.pull * bounds.force
     pulled = _Limit(
         "Largest cable force before any load and under each (5)",
         "cable.force_max",
-        bounds.pull * bounds.force,
+        planned,
         _pull,
         "N",
         remedy=lambda limit, found, _: _pulling(found.value, bounds),
     )
     designs = list(rods)
     found = [
-        _at_most(pulled, bounds.pull * bounds.force, rows, rods),
+        _at_most(pulled, planned, rows, rods),
         *(_at_most(each, each.most, rows, rods) for each in limits if each.most is not None),
         *_strained_as_built(rows, designs, bounds.force),
     ]

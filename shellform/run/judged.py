@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from shellform.case.build_problem import cable_force_planned
 from shellform.case.build_rod import rod_sizes
 from shellform.case.build_safety import critical_factors_asked, is_required
 from shellform.case.case import Case
@@ -47,7 +46,7 @@ def run_checks(run: Run) -> list[Check]:
             least=run.case.optimise.radius_min,
         ),
         uncovered=run.case.net.uncovered_max,
-        pull=cable_force_planned(run.case) / run.case.cable.force_max,
+        pull=limits.cable_utilisation,
     )
     found = checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
     if run.summary.sketch:
