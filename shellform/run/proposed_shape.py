@@ -40,21 +40,21 @@ def stray_told(design: FirstDesign, surface: Surface, steady: WayOut | None) -> 
 def rods_strength(design: FirstDesign) -> str:
     """The entry of [limits] for the rods' stress."""
     begun = max(design.tried.stress, design.tried.unloaded)
-    if begun <= _BEGUN:
-        return f"utilisation = {_LEFT!r}    # of the rods' strength, under any load: the rest is for errors of building"
-    return (
-        f"utilisation = 1.0    # of the rods' strength, under any load; {_LEFT!r} would leave some for errors of building, and the "
-        f"initial design comes to {begun:.2f}"
-    )
+    return _leaving("utilisation", "of the rods' strength, under any load", _LEFT, begun)
 
 
 def cables_pull(design: FirstDesign) -> str:
     """The entry of [limits] for the cables' pull."""
-    begun = design.tried.pull
+    return _leaving("cable_utilisation", "of cable.force_max, as planned", _LEFT_OF_CABLES, design.tried.pull)
+
+
+def _leaving(entry: str, of: str, share: float, begun: float) -> str:
+    """The entry by which a search uses a `share` of something, told as `of` that, where the initial design,
+    which has `begun` with so much of it, leaves more; else all of it."""
     if begun <= _BEGUN:
-        return f"cable_utilisation = {_LEFT_OF_CABLES!r}    # of cable.force_max, as planned: the rest is for errors of building"
+        return f"{entry} = {share!r}    # {of}: the rest is for errors of building"
     return (
-        f"cable_utilisation = 1.0    # of cable.force_max, as planned; {_LEFT_OF_CABLES!r} would leave some for errors of building, and the "
+        f"{entry} = 1.0    # {of}; {share!r} would leave some for errors of building, and the "
         f"initial design comes to {begun:.2f}"
     )
 
