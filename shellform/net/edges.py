@@ -236,16 +236,14 @@ def _stretches(rim: Rim) -> list[Stretch]:
     its last."""
     count = len(rim.points)
     labels = [f"{kind}\n{name}" for kind, name in zip(rim.kinds, rim.names, strict=True)]
-    found = []
+    runs = _runs(labels)
     if rim.cut:
         starts = [0, *(k for k in range(1, count - 1) if labels[k] != labels[k - 1])]
-        for first, last in pairwise([*starts, count - 1]):
-            points = rim.points[first : last + 1]
-            found.append(Stretch(rim.kinds[first], rim.names[first], points, rim.opening, False))
-        return found
-    for first, last in _runs(labels):
-        whole = last - first + 1 == count
+        runs = [(first, next_one - 1) for first, next_one in pairwise([*starts, count - 1])]
+    found = []
+    for first, last in runs:
         at = np.arange(first, last + 2) % count  # up to where the next one begins
+        whole = not rim.cut and last - first + 1 == count
         found.append(Stretch(rim.kinds[first], rim.names[first], rim.points[at], rim.opening, whole))
     return found
 

@@ -77,13 +77,12 @@ def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End
         )
         apart = _APART * net.grid.scale
         for chain in _chains(cut[np.argsort(key, kind="stable")], middle, apart):
-            if _goes_round(middle[chain], apart):  # within the surface
-                order |= {int(end): (len(rims), k) for k, end in enumerate(chain)}
-                rims.append(rim_of(middle[chain], False))
-                continue
-            order |= {int(end): (len(rims), k) for k, end in enumerate(chain, 1)}
-            feet = _reached(middle[chain[[0, -1]]], rims, apart)
-            rims.append(rim_of(np.vstack([feet[:1], middle[chain], feet[1:]]), False, cut=True))
+            points, cut_off = middle[chain], not _goes_round(middle[chain], apart)
+            order |= {int(end): (len(rims), k) for k, end in enumerate(chain, int(cut_off))}
+            if cut_off:
+                feet = _reached(points[[0, -1]], rims, apart)
+                points = np.vstack([feet[:1], points, feet[1:]])
+            rims.append(rim_of(points, False, cut=cut_off))
     for k, node in enumerate(nodes.tolist()):
         if k in order:
             number, vertex = order[k]
