@@ -15,6 +15,7 @@ from shellform.case.build_rod import given_section, layered, rod_material, secti
 from shellform.case.case import (
     Case,
     ConcreteEntry,
+    JointEntry,
     JointsWeightEntry,
     LoadCaseEntry,
     LoadEntry,
@@ -56,11 +57,16 @@ def gridshell(case: Case, net: Net, surface: Surface) -> tuple[Gridshell, dict[s
     """The case's gridshell and its load cases (n, 6): "none", "design", "additional", then the others as they
     are listed.
     """
-    joint = Joint(case.joint.axial, case.joint.torsion, case.joint.bending, case.joint.gap)
+    joint = joint_of(case.joint)
     rod, cable = rod_of(case.rod, net), Cable(case.cable.stiffness)
     edge = edge_beam(case.edges.beam, rod) if net.edges else None
     shell = brace(net, rod, joint, cable, below=surface, edge=edge, edge_cells=has_edge_cells(case))
     return shell, load_cases(case, shell, surface)
+
+
+def joint_of(entry: JointEntry) -> Joint:
+    """The case's joints."""
+    return Joint(entry.axial, entry.torsion, entry.bending, entry.gap)
 
 
 def has_edge_cells(case: Case) -> bool:

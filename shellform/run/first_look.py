@@ -13,13 +13,14 @@ from pydantic import ValidationError
 
 import shellform
 from shellform.case.beside_surface import doubts, refuse_beside
+from shellform.case.build_gridshell import joint_of
 from shellform.case.build_net import net_record, refuse_distant, size_text, surface_of, surface_record
 from shellform.case.build_rod import given_section, rod_material
 from shellform.case.case import Case, SurfaceEntry, load_case
 from shellform.case.entries import Entry, NetEntry
 from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError, require_degrees, require_file
-from shellform.gridshell.gridshell import Joint, Rod
+from shellform.gridshell.gridshell import Rod
 from shellform.gridshell.joints import doubts as joint_doubts
 from shellform.gridshell.joints import usual_gap
 from shellform.net.chebyshev import NetSettings
@@ -119,10 +120,9 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
 
 def _of_joints(case: Case) -> Iterator[str]:
     """What of the joints doesn't fit rods whose size is given."""
-    section, given = given_section(case.rod), case.joint
+    section = given_section(case.rod)
     if section is not None:
-        joint = Joint(given.axial, given.torsion, given.bending, given.gap)
-        for doubt in joint_doubts(joint, Rod(section)):
+        for doubt in joint_doubts(joint_of(case.joint), Rod(section)):
             yield f"{doubt.told()}."
 
 
