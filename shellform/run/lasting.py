@@ -22,11 +22,14 @@ _TABLES = ("rods", "bars", "splices", "marks", "cables", "supports", "survey")
 _NET_MAPS = ("net-distance", "net-curvature", "net-skew", "net-springs")
 _MAPS = ("deviations", "objective", "constraints")
 _NOW_AND_THEN = ("edge_beams", "shear_blocks")  # tables
-_DOCUMENTS = (
-    *(f"drawings/{name}{ending}" for name in _SHEETS for ending in (".dxf", ".pdf")),
+_SCHEDULES = (
     *(f"schedules/{name}.csv" for name in _TABLES),
     "schedules/notes.txt",
     "schedules/schedules.xlsx",
+)
+_DOCUMENTS = (
+    *(f"drawings/{name}{ending}" for name in _SHEETS for ending in (".dxf", ".pdf")),
+    *_SCHEDULES,
     *(
         f"models/{name}"
         for name in ("gridshell.vtu", "gridshell.3dm", "gridshell.glb", "blender.py", "grasshopper.py")
@@ -54,7 +57,7 @@ def take_away(folder: Path, stage: str) -> None:
         gone.append(folder / "figures/failure.png")
     if at <= STAGES.index("documents"):
         gone += [*folder.glob("drawings/*"), *folder.glob("models/*")]
-        gone += [folder / name for name in _DOCUMENTS]
+        gone += [folder / name for name in _SCHEDULES]
         gone += [folder / f"schedules/{name}.csv" for name in _NOW_AND_THEN]
     for file in gone:
         if file.is_file():
