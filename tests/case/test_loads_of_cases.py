@@ -217,18 +217,23 @@ def test_parts_without_load_cases_are_refused(tmp_path):
         read(tmp_path, PLAIN + '\n[part.rods]\nkind = "rods"\n')
 
 
+ON_NO_NET = [
+    ("density = 2000.0\nstrength", "strength", "part.rods: rod.density"),
+    (
+        "factors = { wet = 1.0, rods = 1.0, joints = 1.0, cloth = 1.0 }",
+        "factors = { wet = 0.0 }",
+        "'design': weighs nothing",
+    ),
+    ("factors = { foot = 1.0, band = 1.0, tip = 2.0 }", "", "load 'rest': names no part"),
+    ('name = "rest"', 'name = "pour 1"', "a stage has the name of another case"),
+]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
         ("ring = [-1.0, 0.1]", "ring = [5.0, 6.0]", "part.foot: load: no part of the surface"),
-        ("density = 2000.0\nstrength", "strength", "part.rods: rod.density"),
-        (
-            "factors = { wet = 1.0, rods = 1.0, joints = 1.0, cloth = 1.0 }",
-            "factors = { wet = 0.0 }",
-            "'design': weighs nothing",
-        ),
-        ("factors = { foot = 1.0, band = 1.0, tip = 2.0 }", "", "load 'rest': names no part"),
-        ('name = "rest"', 'name = "pour 1"', "a stage has the name of another case"),
+        *ON_NO_NET,
     ],
 )
 def test_loads_that_do_not_fit_the_net_are_named(tmp_path, net, vault, old, new, said):
@@ -241,14 +246,7 @@ def test_loads_that_do_not_fit_the_net_are_named(tmp_path, net, vault, old, new,
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("density = 2000.0\nstrength", "strength", "part.rods: rod.density"),
-        (
-            "factors = { wet = 1.0, rods = 1.0, joints = 1.0, cloth = 1.0 }",
-            "factors = { wet = 0.0 }",
-            "'design': weighs nothing",
-        ),
-        ("factors = { foot = 1.0, band = 1.0, tip = 2.0 }", "", "load 'rest': names no part"),
-        ('name = "rest"', 'name = "pour 1"', "a stage has the name of another case"),
+        *ON_NO_NET,
         (
             "[cable]",
             '[limits]\nslack_min = 1.0\nslack_loads = ["pour"]\n[cable]',
