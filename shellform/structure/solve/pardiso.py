@@ -125,9 +125,9 @@ class Factoriser:
         self._none = np.zeros(1)
         self._values = self._none
         self._analysed = False
-        self._finalizer = weakref.finalize(
-            self, _release, self._kind, self._handle, self._settings, self.size
-        )
+        kept_as = self._handle, self._settings, self._rows, self._columns, self._kept
+        self._fixed = _Fixed(self._kind, self.size, *kept_as)
+        self._finalizer = weakref.finalize(self, _release, self._fixed)
 
     def factor(self, values: Reals) -> None:
         """Factorises the matrix with lower `values` (nnz,). Raises NotDefinite, MemoryError."""
@@ -186,20 +186,7 @@ class Factoriser:
         self._analysed = True
 
     def _call(self, phase: int, count: int, right: Reals, solution: Reals) -> None:
-        error = _pardiso(
-            phase,
-            self._kind,
-            self._handle,
-            self._settings,
-            self.size,
-            self._values,
-            self._rows,
-            self._columns,
-            self._kept,
-            count,
-            right,
-            solution,
-        )
+        error = _pardiso(self._fixed, phase, self._values, count, right, solution)
         if error == _NOT_DEFINITE:
             raise NotDefinite
         if error == _FULL:
@@ -208,32 +195,42 @@ class Factoriser:
             raise ArithmeticError(f"PARDISO ended with error {error} in phase {phase}")
 
 
-def _pardiso(
-    phase: int,
-    kind: int,
-    handle: _Integers,
-    settings: _Integers,
-    size: int,
-    values: Reals,
-    rows: _Integers,
-    columns: _Integers,
-    kept: _Integers,
-    count: int,
-    right: Reals,
-    solution: Reals,
-) -> int:
-    one, quiet = ctypes.c_int(1), ctypes.c_int(0)
-    step, order, sides, error = ctypes.c_int(phase), ctypes.c_int(size), ctypes.c_int(count), ctypes.c_int(0)
+class _Fixed:
+    """What is the same in all calls for one matrix, and where it lies: finding that out anew took as long as
+    a tenth of a solve of 1,500 rows."""
+
+    def __init__(
+        self,
+        kind: int,
+        size: int,
+        handle: _Integers,
+        settings: _Integers,
+        rows: _Integers,
+        columns: _Integers,
+        kept: _Integers,
+    ) -> None:
+        self.size, self.begun = size, handle
+        self._held = settings, rows, columns, kept  # as long as their places are known
+        self.handle, self.settings, self.kept = _at(handle), _at(settings), _at(kept)
+        self.rows, self.columns = _at(rows), _at(columns)
+        self.kind, self.order = ctypes.byref(ctypes.c_int(kind)), ctypes.byref(ctypes.c_int(size))
+
+
+_ONE, _QUIET = ctypes.byref(ctypes.c_int(1)), ctypes.byref(ctypes.c_int(0))
+
+
+def _pardiso(fixed: _Fixed, phase: int, values: Reals, count: int, right: Reals, solution: Reals) -> int:
+    step, sides, error = ctypes.c_int(phase), ctypes.c_int(count), ctypes.c_int(0)
     ref = ctypes.byref
     mkl = library()
-    threads = min(2, cores()) if size > _TWO_THREADS_FROM else 1
+    threads = min(2, cores()) if fixed.size > _TWO_THREADS_FROM else 1
     if phase == _SOLVE and count >= _MANY:
         threads = 2
     before = mkl.MKL_Set_Num_Threads_Local(threads)
     mkl.PARDISO(
-        _at(handle), ref(one), ref(one), ref(ctypes.c_int(kind)), ref(step), ref(order), _at(values),
-        _at(rows), _at(columns), _at(kept),
-        ref(sides), _at(settings), ref(quiet), _at(right), _at(solution), ref(error),
+        fixed.handle, _ONE, _ONE, fixed.kind, ref(step), fixed.order, _at(values),
+        fixed.rows, fixed.columns, fixed.kept,
+        ref(sides), fixed.settings, _QUIET, _at(right), _at(solution), ref(error),
     )  # fmt: skip
     mkl.MKL_Set_Num_Threads_Local(before)
     return error.value
@@ -250,8 +247,7 @@ def _at(array: Any) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-def _release(kind: int, handle: _Integers, settings: _Integers, size: int) -> None:
-    if handle.any():
+def _release(fixed: _Fixed) -> None:
+    if fixed.begun.any():
         none = np.zeros(1)
-        empty = np.zeros(1, dtype=np.int32)
-        _pardiso(_RELEASE, kind, handle, settings, size, none, empty, empty, empty, 1, none, none)
+        _pardiso(fixed, _RELEASE, none, 1, none, none)
