@@ -49,6 +49,9 @@ _ONE_THREAD = {
     )
 } | {"MKL_CBWR": "AUTO"}  # MKL adds up in the same order in each process
 
+# bytes given back that the C library keeps: with Dask's 64 kB a design takes 7 % longer, in as much memory
+_HEAP = {"MALLOC_TRIM_THRESHOLD_": "67108864", "MALLOC_MMAP_THRESHOLD_": "33554432"}
+
 # Run by each worker process as it starts: Ctrl-C reaches all processes of a terminal, and the study alone
 # answers it and ends its workers.
 _QUIET = """import logging, signal
@@ -163,7 +166,7 @@ def _settings(processes: bool, dashboard: bool) -> dict[str, Any]:
         "distributed.worker.profile.enabled": False,
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
-        "distributed.nanny.pre-spawn-environ": {**_ONE_THREAD, "MALLOC_TRIM_THRESHOLD_": "65536"},
+        "distributed.nanny.pre-spawn-environ": {**_ONE_THREAD, **_HEAP},
         "distributed.comm.timeouts.connect": "30s",
         # A worker that dies is begun anew by its nanny. Where that takes longer than this, the cluster ends
         # the nanny, and nothing begins a worker any more: at six times the load that its cores can bear, a
