@@ -29,7 +29,7 @@ run is made again without solving anything; so a search that is resumed ends wit
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -52,6 +52,7 @@ from shellform.optimiser.trials import reach, staged
 from shellform.problem.evaluation import COUNTS, Evaluated, Evaluator, Linearisation, OffBranch
 from shellform.problem.paths import follow, without_slack
 from shellform.problem.problem import Problem
+from shellform.structure.solve.loading import Loaded
 from shellform.work_clock import Work, counts_as
 
 _NUMBERS = ("stage", "margin", "until", "caution")
@@ -163,14 +164,15 @@ def minimise_directly(
     progress: Callable[[Step], None] | None = None,
     keep: Callable[[Checkpoint], None] | None = None,
     resume: Checkpoint | None = None,
+    followed: Mapping[str, Loaded] | None = None,
 ) -> Optimum:
     """The best design that MMA finds from `start` in a number of design `evaluations`, without slack cables.
 
-    `progress`, `keep` and `resume` as in `optimise`. Raises NotConverged where the start doesn't carry the
-    design load, or no design was found that carries the further ones; InputError where the start lies outside
-    the bounds.
+    `progress`, `keep`, `resume` and `followed` as in `optimise`. Raises NotConverged where the start doesn't
+    carry the design load, or no design was found that carries the further ones; InputError where the start
+    lies outside the bounds.
     """
-    search = _begun(problem, start, solver, evaluations, progress, keep)
+    search = _begun(problem, start, solver, evaluations, progress, keep, followed)
     if resume is not None:
         _resume(search, resume)
     while search.left() > 0:
@@ -191,13 +193,13 @@ def _begun(
     evaluations: int,
     progress: Callable[[Step], None] | None,
     keep: Callable[[Checkpoint], None] | None,
+    followed: Mapping[str, Loaded] | None,
 ) -> _Search:
     """The search at its start, led as far as that bears the further loads."""
-    began = time.perf_counter()
+    began, used = time.perf_counter(), problem.used()
     evaluator = Evaluator(problem, start)
-    reached = evaluator.begin()
+    reached = evaluator.begin(followed)
     search = _Search(problem, solver, evaluator, evaluations, progress, keep, began, margin=solver.margin)
-    used = problem.used()
     state = reached[search.base].equilibrium.state
     if all(reached[name].on_branch for name in used):
         states = {name: reached[name].equilibrium.state for name in used}

@@ -46,7 +46,7 @@ all loads there, the last accepted design that does is returned.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -88,6 +88,7 @@ from shellform.reliability.trial_structures import Judging
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.threads import dense_on_one
 from shellform.structure.network import assemble
+from shellform.structure.solve.loading import Loaded
 
 _AGAIN = 0.01  # of the objective, gained by polishing, for which it is begun again from there
 _SEED = 1  # added to the safety's: margins of tension are told by structures that judge nothing
@@ -105,6 +106,7 @@ def optimise(
     keep: Keep | None = None,
     judging: Judging | None = None,
     resume: Checkpoint | None = None,
+    followed: Mapping[str, Loaded] | None = None,
 ) -> Optimum:
     """The best design found from `start` within a number of design `evaluations`.
 
@@ -115,7 +117,7 @@ def optimise(
 
     `progress(step)` is called at each trial, `judging(done, most)` while structures of a design are drawn,
     and `keep(checkpoint)` before each trial: with `resume` the same call goes on from there to the same
-    result.
+    result. Who has `followed` the start under the problem's loads (paths.follow) spares doing it again.
 
     Raises NotConverged where the start doesn't carry the design load, with the paper's advice; InputError
     where it lies outside the variables' bounds, or has no cables and their lengths are to vary.
@@ -132,6 +134,7 @@ def optimise(
                 progress=progress,
                 keep=keep,
                 resume=resume,
+                followed=followed,
             )
         asked, share = None, solver.stiffness
         if safety is not None:
@@ -149,6 +152,7 @@ def optimise(
             keep=keep,
             asked=asked,
             judging=judging,
+            followed=followed,
         )
         if resume is not None:
             search, it = resumed(search, resume)
@@ -251,6 +255,7 @@ def _polished(
             progress=progress,
             asked=asked,
             judging=judging,
+            followed=best.loaded if groups is None else None,
         )
         models = Models(search.evaluator, solver, search.models.reach, whole=alike is not None)
         search = replace(search, always_guarded=True, groups=alike, models=models)
@@ -300,10 +305,11 @@ def begin(
     keep: Keep | None = None,
     asked: Demand | None = None,
     judging: Judging | None = None,
+    followed: Mapping[str, Loaded] | None = None,
 ) -> tuple[Search, Iterate]:
     """A search of the problem and its first iterate. `kept` gives the stiffness, N/m, that no mode may fall
     below under the further loads, from that of the start's softest mode under the design load; what is
-    `asked` of designs as built."""
+    `asked` of designs as built; what the start is known to come to (`followed`)."""
     began = time.perf_counter()
     if not start.present.any() and any(block.of_each_cable for block in problem.variables):
         raise InputError(
@@ -318,7 +324,7 @@ def begin(
     )
     evaluator = Evaluator(inner, start)
     evaluator.blocks.check_start()
-    reached = evaluator.begin()
+    reached = evaluator.begin(followed)
     used, base = inner.used(), evaluator.base
     state = reached[base].equilibrium.state
     if all(reached[name].on_branch for name in used):

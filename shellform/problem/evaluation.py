@@ -123,13 +123,13 @@ class Evaluator:
         self._known: list[tuple[Term, Design, Measurement]] = []
         self._far = np.inf
 
-    def begin(self) -> dict[str, Loaded]:
-        """Loads the start design step by step, sets the objective's weights, and returns how far each load
-        case came.
-
-        Raises NotConverged where the design load snaps through, InputError where a term can't be weighed.
+    def begin(self, followed: Mapping[str, Loaded] | None = None) -> dict[str, Loaded]:
+        """Loads the start design step by step, where it isn't known what that comes to (`followed`), sets the
+        objective's weights, and returns how far each load case came. Raises NotConverged where the design
+        load snaps through, InputError where a term can't be weighed.
         """
-        reached = follow(self.shell, self.start, self.problem.loads)
+        known = followed or follow(self.shell, self.start, self.problem.loads)
+        reached = {name: known[name] for name in self.problem.loads}
         for each in reached.values():
             self._count(each.factorisations)
         first = reached[self.base]
@@ -379,22 +379,22 @@ def _chained(
     """Total derivatives (g, c) by all rest lengths, and (g, c + 1) by the radius where it moves; where no
     equilibrium is needed there is no `assembly`."""
     shell, design, state = at.shell, at.design, at.state
-    partial = sp.hstack(
-        [
-            sp.vstack([each.by_rest_length for each in measurements]),
-            sp.csr_array(np.concatenate([each.by_radius for each in measurements])[:, None]),
-        ]
-    ).toarray()[:, : len(shell.cable_ends) + moves_radius]
+    cables = len(shell.cable_ends)
+    partial = np.vstack([_dense(each.by_rest_length) for each in measurements])
+    if moves_radius:
+        partial = np.column_stack([partial, np.concatenate([each.by_radius for each in measurements])])
     if assembly is None:
-        return np.asarray(partial)
+        return partial
     # A column of each candidate cable, empty for the absent ones.
-    present = np.flatnonzero(design.present)
-    spread = sp.csr_array(
-        (np.ones(len(present)), (np.arange(len(present)), present)),
-        shape=(len(present), len(shell.cable_ends)),
-    )
+    spread = sp.eye_array(cables, format="csr")[design.present]
     rates = [shell.beams_by_radius(design.radius)] if moves_radius else []
     columns = sp.csc_array(by_rest_length(assembly, state, shell.cables(design)) @ spread)
     response = respond(assembly, state, columns, by_stiffness(assembly, state, *rates))
-    by_state = sp.vstack([each.by_dof for each in measurements]).tocsc()[:, assembly.free].toarray()
+    by_state = np.vstack([_dense(each.by_dof)[:, assembly.free] for each in measurements])
     return gradients(response, by_state, partial)
+
+
+def _dense(rates: sp.csr_array | None) -> Reals:
+    """Derivatives of a complete measurement."""
+    assert rates is not None
+    return np.asarray(rates.toarray())

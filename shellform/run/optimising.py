@@ -37,6 +37,7 @@ from shellform.run.designs import followed, forget, keep
 from shellform.run.pace import POLISHING_TAKES, WITHOUT_LOADS, Pace, time_words
 from shellform.run.robustness import robustness
 from shellform.run.workspace import Workspace
+from shellform.structure.solve.loading import Loaded
 from shellform.tables import Table, table_text
 from shellform.written import write_text
 
@@ -44,16 +45,23 @@ _QUIET = 10.0  # s between two notes on the judgement of a design
 _UNLOADED = 15  # evaluations at most, of the design without regard to the loads
 
 
-def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals], summary: Summary) -> Summary:
+def optimise(
+    workspace: Workspace,
+    shell: Gridshell,
+    loads: Mapping[str, Reals],
+    summary: Summary,
+    initial: Mapping[str, Loaded] | None = None,
+) -> Summary:
     """Makes the designs "optimised", "rounded", "polished" and "unloaded", as the case asks for them, and
-    returns the summary with what came of it.
+    returns the summary with what came of it; `initial`: what the initial design comes to under the loads,
+    where it was followed just before.
 
     Raises InputError and NotConverged as the optimiser.
     """
     entry = workspace.case.optimise
     start = shell.design(rest_ratio=workspace.case.cable.rest_ratio)
     groups = symmetric_groups(shell) if entry.symmetric else None  # at once: it may be refused
-    best = _best(workspace, shell, start, loads)
+    best = _best(workspace, shell, start, loads, initial)
     summary = forget(workspace.folder, ("unloaded", "optimised", "rounded", "polished"), summary)
     reached = {each: best.loaded[each] for each in loads}
     summary = keep(workspace, shell, "optimised", best.design, reached, loads, summary)
@@ -107,7 +115,13 @@ def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals],
     return replace(summary, optimisation=record)
 
 
-def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[str, Reals]) -> Optimum:
+def _best(
+    workspace: Workspace,
+    shell: Gridshell,
+    start: Design,
+    loads: Mapping[str, Reals],
+    initial: Mapping[str, Loaded] | None,
+) -> Optimum:
     """The optimised design, begun anew or gone on with from a checkpoint."""
     from shellform.optimiser import optimise as optimiser
 
@@ -145,6 +159,7 @@ def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[
         keep=lambda checkpoint: save_checkpoint(workspace.folder, key, checkpoint),
         judging=_judging(workspace),
         resume=checkpoint,
+        followed=initial,
     )
 
 

@@ -60,6 +60,7 @@ from shellform.run.sketch import STAGES_OF_SKETCH, draw_sketch, drop_other, refu
 from shellform.run.way_out import COVERED, with_way_out
 from shellform.run.workspace import Workspace
 from shellform.structure.elements.threads import dense_on_one
+from shellform.structure.solve.loading import Loaded
 from shellform.surface.shape.target import Surface
 from shellform.work_clock import listening
 from shellform.written import make_folder, write_text
@@ -69,12 +70,13 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True, eq=False)
 class Parts(Record):
-    """What the stages hand on; None until its stage is done."""
+    """What the stages hand on; None until its stage is done, `initial` where that was done before."""
 
     surface: Surface | None = None
     net: Net | None = None
     shell: Gridshell | None = None
     loads: Mapping[str, Reals] | None = None
+    initial: Mapping[str, Loaded] | None = None
     maps: DrawnMaps | None = None
 
 
@@ -310,6 +312,7 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
         workspace.say("initial", f"loading the {name} design", Kind.BEGAN)
         reached = designs.followed(shell, design, loads)
         summary = designs.keep(workspace, shell, name, design, reached, loads, summary)
+    parts = replace(parts, initial=reached)
     first = summary.designs["initial"].loads["design"]
     span = max(_there(summary.surface).size[:2])
     if not first.on_branch or first.deviation_max > 0.1 * span:
@@ -329,7 +332,7 @@ def _optimise(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) 
         return _Ended(parts, replace(summary, verdict=judged(read_run(workspace.folder))))
     from shellform.run.optimising import optimise
 
-    summary = optimise(workspace, _there(parts.shell), _there(parts.loads), summary)
+    summary = optimise(workspace, _there(parts.shell), _there(parts.loads), summary, parts.initial)
     write_summary(workspace.folder, summary)
     return _Ended(parts, replace(summary, verdict=judged(read_run(workspace.folder))))
 

@@ -149,12 +149,12 @@ def test_a_direct_search_resumed_anywhere_ends_with_the_same_design_and_history_
 
 def test_a_direct_search_resumed_with_states_of_twice_the_digits_has_all_of_them(coarse):
     kept, asked = [], (problem(coarse), coarse.design(), sf.MovingAsymptotes(), 3, None)
-    search = moving_asymptotes._begun(*asked, kept.append)
+    search = moving_asymptotes._begun(*asked, kept.append, None)
     step = np.full((coarse.node_count, 6), 1e-17)
     states = {name: moved(extended(state), step) for name, state in search.best.states.items()}
     search.near = [replace(search.best, states=states)]
     moving_asymptotes._tell(search)
-    again = moving_asymptotes._begun(*asked, None)
+    again = moving_asymptotes._begun(*asked, None, None)
     moving_asymptotes._resume(again, kept[0])
     for name, state in states.items():
         assert state.tail.any()
@@ -444,7 +444,8 @@ def test_a_direct_search_begins_as_far_as_its_start_bears_the_further_loads(monk
         def __init__(self, problem, start):
             pass
 
-        def begin(self):
+        def begin(self, followed):
+            assert followed == "known"
             return loaded("wet", "wetter", falling=() if on_branch else ["wetter"])
 
         def seed(self, start, states, stage):
@@ -461,7 +462,7 @@ def test_a_direct_search_begins_as_far_as_its_start_bears_the_further_loads(monk
     )
     monkeypatch.setattr(moving_asymptotes._Search, "begin", lambda search, point: seeded.append(point))
     problem = SimpleNamespace(used=lambda: ["wet", "wetter"], design_load=SimpleNamespace(name="wet"))
-    search = moving_asymptotes._begun(problem, "start", sf.MovingAsymptotes(), 40, None, None)
+    search = moving_asymptotes._begun(problem, "start", sf.MovingAsymptotes(), 40, None, None, "known")
     assert seeded == [({"wet": "wet", "wetter": "wetter"}, 1.0) if on_branch else ("wet at 0.6", 0.6)]
     assert (search.stage, search.margin, search.evaluations) == (1.0 if on_branch else 0.6, 0.15, 40)
 

@@ -224,9 +224,10 @@ def test_a_round_that_brings_a_node_too_far_off_or_finds_nothing_is_not_taken(ro
 @pytest.fixture
 def polishing(monkeypatch):
     """One round, whose search ends as told."""
-    told = SimpleNamespace(asked=[], end=None, fell=False, mind=None, ran=[])
+    told = SimpleNamespace(asked=[], followed=[], end=None, fell=False, mind=None, ran=[])
 
-    def begin(problem, start, solver, kept, evaluations, progress, *, asked, judging):
+    def begin(problem, start, solver, kept, evaluations, progress, *, asked, judging, followed):
+        told.followed.append(followed)
         told.asked.append((problem, start, kept(123.0), evaluations, asked))
         search = Held(
             models=SimpleNamespace(reach=0.3),
@@ -298,6 +299,7 @@ def test_polishing_varies_lengths_alone_where_they_are_variables_and_keeps_the_s
     both = [sf.FreeRadius(), sf.RestLengths(0.02)]
     polished_once(polishing, optimum_of(problem_of(variables=both), fallen=(7,)))
     problem, start, kept, evaluations, _ = polishing.asked[0]
+    assert polishing.followed == [optimum_of().loaded], "as the search before left it"
     assert problem.variables == [sf.RestLengths(0.02)]
     assert [part.term for part in problem.minimise] == [sf.Misfit("wet")]
     assert (start.rest_length.tolist(), kept, evaluations) == ([1.0, 2.0, 4.0], pytest.approx(0.4), 6)
@@ -317,6 +319,7 @@ def test_cables_of_a_group_are_polished_from_their_mean_length(polishing):
     polishing.end = optimum_of(objective=0.9)
     polished_once(polishing, optimum_of(), groups=np.array([5, 2, 5]))
     assert polishing.asked[0][1].rest_length.tolist() == [2.5, 2.0, 2.5]
+    assert polishing.followed == [None], "which nobody followed"
     search, _ = polishing.ran[0]
     assert (search.groups.tolist(), search.models[-1]) == ([1, 0, 1], True)
 
@@ -404,7 +407,7 @@ def test_a_search_begins_at_its_start_as_far_as_that_bears_the_further_loads(
         def __init__(self, inner, start):
             self.problem = inner
 
-        def begin(self):
+        def begin(self, followed):
             state = {"wet": "rest", "wetter": "under more", "wind": "under wind"}
             return {
                 name: SimpleNamespace(

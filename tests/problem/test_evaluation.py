@@ -67,7 +67,7 @@ def test_an_equilibrium_many_times_as_far_off_as_the_start_s_is_another_one(
     paths = {"wet": reached(first), "wetter": reached(further), "wind": reached(1.0, on_branch=False)}
     monkeypatch.setattr(evaluation, "follow", lambda shell, start, loads: paths)
     monkeypatch.setattr(evaluation, "start_weights", lambda *given: given[1:])
-    assert evaluator.begin() is paths
+    assert evaluator.begin() == paths
     assert (evaluator.factorisations, evaluator.equilibria) == (12, 3)
     assert evaluator.weights == ("start", paths)
     for away, kept in ((0.999 * farthest, True), (1.001 * farthest, False)):
@@ -77,6 +77,16 @@ def test_an_equilibrium_many_times_as_far_off_as_the_start_s_is_another_one(
         assert (tried.state is found.state) == kept
         assert (tried.why == "") == kept
         assert tried.factorisations == 3
+
+
+def test_a_start_that_was_followed_before_is_not_again_and_counts_the_same(evaluator, monkeypatch):
+    paths = {"none": reached(9.0), "wet": reached(0.1), "wetter": reached(0.2), "wind": reached(0.3)}
+    monkeypatch.setattr(evaluation, "start_weights", lambda *given: given[1:])
+    monkeypatch.setattr(evaluation, "follow", None)
+    own = {name: paths[name] for name in ("wet", "wetter", "wind")}
+    assert evaluator.begin(paths) == own, "the problem's loads alone"
+    assert (evaluator.factorisations, evaluator.equilibria) == (12, 3)
+    assert evaluator.weights == ("start", own)
 
 
 def test_terms_of_a_changed_problem_that_were_measured_in_the_same_states_are_not_again(
