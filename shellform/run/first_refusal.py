@@ -147,6 +147,9 @@ def _to_nearest(
     if nearest is None and again.may_stand:
         again.go_on()
         nearest = nearest_of(surface, [again.best.share])
+    if nearest is None and again.thin is not None:
+        again.take_thin()
+        nearest = nearest_of(surface, [again.thin.share])
     if nearest is None:
         return None
     assert again.design is not None
@@ -183,20 +186,32 @@ class _Brief:
     bore: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Thin:
+    """The `design` that stands, with less concrete than is poured at once, on a surface rounded to a `share`
+    of the radius asked for, and the `wish` it was found with."""
+
+    share: float
+    wish: DesignWish
+    design: FirstDesign
+
+
 class _Rounded:
     """The search on a rounded surface for what stands, within the work of all such trials; on walls too where
     a net covers it that falls on edge beams.
 
     Trials are brief, so that rounder surfaces have their turn. Where none stands, what brief trials have no
     time for is tried on the `best` one, with all the work that is left: finer spacings, and concrete as thin
-    as it has to be. The best is the one that bore most, or the roundest, where no net covered any."""
+    as it has to be. The best is the one that bore most, or the roundest, where no net covered any. Where
+    nothing comes of that either, `thin` is what stood with less concrete than brief trials are after."""
 
     def __init__(self, wish: DesignWish, whole: Allowance, say: Say) -> None:
         self.design: FirstDesign | None = None  # of the last surface, where one stands
         self.wish = wish  # of which it is
         self.options = ""  # of the command, that stand for it
         self.best = _Brief(0.0, wish, 0.0)
-        self._thorough = False
+        self.thin: _Thin | None = None
+        self._thorough = self._takes_thin = False
         self.begun = False  # whether any surface was tried
         self._covered = False
         self._say = say
@@ -215,6 +230,10 @@ class _Rounded:
         self._thorough = True
         self._brief = self._walled = self._whole.rest(1.0, thin_layers=True)
 
+    def take_thin(self) -> None:
+        """What is known to stand, which isn't looked for again."""
+        self._takes_thin = True
+
     def __call__(self, surface: Surface, share: float) -> None:
         """Raises InputError or NotConverged where no design stands on the surface, rounded to such a share of
         the radius."""
@@ -223,10 +242,13 @@ class _Rounded:
             raise _untried("a rounder one stands and most of the work is done")
         plinths = plinths_for(surface)  # which whoever follows gets too
         surface = surface if plinths is None else plinths.surface
+        if self._takes_thin and self.thin is not None:
+            self._take(self.thin.design, self.thin.wish, surface)
+            return
         wish = self.best.wish if self._thorough else self.wish
         how = "rounded, thoroughly" if self._thorough else "rounded"
         try:
-            self.design = self._tried(how, surface, share, wish, self._brief)
+            self._tried(how, surface, share, wish, self._brief)
         except (InputError, NotConverged) as error:
             covered = not (isinstance(error, Unbuildable) and error.why is Why.NET)
             self._covered = self._covered or covered
@@ -234,24 +256,31 @@ class _Rounded:
                 raise  # a rounder one that stands on its own edges is worth more than one on walls
             self._say(f"rounded: {error}")
             walls = replace(wish, edges="wall", angle=self._brief.angle)
-            self.design = self._tried(f"{how}, on walls", surface, share, walls, self._walled)
+            self._tried(f"{how}, on walls", surface, share, walls, self._walled)
 
     def _tried(
         self, how: str, surface: Surface, share: float, wish: DesignWish, allowance: Allowance
-    ) -> FirstDesign:
-        """The design that stands with a wish; where none does, the trial may be the best."""
+    ) -> None:
+        """Takes the design that stands with a wish; where none does, the trial may be the best."""
         allowance.bore, allowance.angle = 0.0, wish.angle
         try:
             design = _trial(how, surface, wish, allowance, self._say, finer=self._thorough)
-        except (InputError, NotConverged):
+        except (InputError, NotConverged) as error:
+            stood = error.design if isinstance(error, (Unbuildable, Falls)) else None
+            if self.thin is None and stood is not None and wish.thickness is None:
+                self.thin = _Thin(share, wish, stood)
             if allowance.bore > self.best.bore or self.best.bore == 0.0:
                 self.best = _Brief(share, replace(wish, angle=allowance.angle), allowance.bore)
             raise
+        self._take(design, wish, surface)
+
+    def _take(self, design: FirstDesign, wish: DesignWish, surface: Surface) -> None:
+        """The design, with what of the wish whoever follows has to give."""
         if wish.edges != self.wish.edges:
             self.wish, self.options = replace(self.wish, edges=wish.edges), _WALLS
         self.wish, layer = _with_layer(self.wish, surface, design)
         self.options = f"{self.options} {layer}".strip()
-        return design
+        self.design = design
 
 
 def _trial(

@@ -20,7 +20,7 @@ from shellform.run.first_refusal import shares
 from shellform.run.plinths import Plinths
 from shellform.run.propose import propose_case
 from shellform.run.sizes import MOST_CROSSINGS, DesignWish
-from shellform.run.unbuildable import Unbuildable, Why
+from shellform.run.unbuildable import Falls, Unbuildable, Why
 from shellform.run.way_out import with_way_out
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.fairing import Faired
@@ -267,6 +267,32 @@ def test_a_rounded_surface_that_falls_on_edge_beams_is_offered_on_walls(tmp_path
     assert again.way_out.wish.edges == "wall"
     assert again.way_out.design is STANDS, "which whoever goes on has finished, and nothing is searched twice"
     assert named(told).stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize("asked", [None, 0.05])
+def test_a_thin_layer_that_stood_on_a_rounded_surface_is_the_way_out_where_nothing_else_is(
+    tmp_path, monkeypatch, asked
+):
+    """A groined roof of 43 m, rounded and on walls, stood with 9 mm in 40 of 40 structures, and was refused
+    without a way out."""
+    thin, tried = SimpleNamespace(thickness=0.009), []
+
+    def search(surface, wish, say, allowance, *, finer=False):
+        tried.append((wish.edges, finer))
+        raise Falls("falls", remedy="", design=thin if wish.edges == "wall" and not finer else None)
+
+    monkeypatch.setattr(first_refusal, "standing_design", search)
+    refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
+    wish = DesignWish(thickness=asked)
+    found = first_refusal.with_ways_out(refusal, sheet(gable), wish, tmp_path / "a.toml", lambda text: None)
+    if asked is not None:
+        assert found.way_out is None, "another was asked for"
+        return
+    assert found.way_out.design is thin
+    assert (found.way_out.wish.edges, found.way_out.wish.thickness) == ("wall", 0.009)
+    assert "(in metres, with --edges wall --thickness 0.009)" in found.offered.remedy
+    assert named(found.offered).is_file()
+    assert ("wall", False) in tried[:2]
 
 
 @pytest.mark.parametrize(

@@ -164,6 +164,30 @@ def test_what_is_not_rounded_at_once_is_rounded_in_stages():
     assert found.change[far].max() < 0.1, "what is flat stays where it is"
 
 
+def lobes(x, y):
+    """Six between groins that meet in the middle, with free edges."""
+    r, turn = np.hypot(x, y), (np.arctan2(y, x) + np.pi / 6.0) % (np.pi / 3.0) - np.pi / 6.0
+    return 1.2 + r * r * (0.025 - 0.14 * (6.0 * turn / np.pi) ** 2)
+
+
+def test_what_is_not_rounded_on_a_fine_mesh_is_on_a_coarser_one():
+    """A quarter of the vertices: a change travels faster from one pair of rings to the next."""
+    surface, radius = sheet(lobes), 1.4
+    fine, coarse = fairing._meshes(surface, radius)
+    assert len(fine.vertices) > 3 * len(coarse.vertices)
+    with pytest.raises(NotConverged, match="No surface near this one"):
+        fairing._rounded(fine, everywhere(fine), [radius])
+    found = faired(surface, radius)
+    assert len(found.change) == len(coarse.vertices)
+    bent = np.abs(curvature(found.surface)).max(axis=1)[inside(found.surface)]
+    assert np.percentile(bent, 99) <= 1.0 / radius * 1.15
+
+
+def test_a_mesh_that_shows_the_radius_has_no_coarser_one():
+    fine = fairing._refined(sheet(gable), 0.3)
+    assert [len(each.vertices) for each in fairing._meshes(fine, 1.5)] == [len(fine.vertices)]
+
+
 def test_stages_change_no_more_than_one_step_does():
     before, off = sheet(gable), []
     for radii in ([1.5], [0.6, 1.0, 1.5]):

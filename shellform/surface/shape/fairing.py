@@ -36,12 +36,17 @@ Where much has to change, quadratics fitted across a sharp crease say little of 
 radius grows in stages from what the surface keeps to R, each from the places p that the one before has come
 to, with D, frames and multipliers made anew: ½ ∫ |p - v + d D|² dA is what is least there, so that it stays
 the change from the surface as given.
+
+A quadratic sees two rings of neighbours, so that on a fine mesh a change travels slowly across R. Where
+nothing comes of it, a coarser one is tried, before stages, and with stages first: it shows the curvature less
+well, but eight lobes that meet in a point are rounded on a quarter of the vertices alone, in a quarter of the
+time.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,6 +60,7 @@ from shellform.surface.shape.target import ON_GROUND, Surface, make_surface, rou
 from shellform.surface.shape.triangles import area_vectors, directed_edges, vertex_areas
 
 _MESH = 0.3  # of R: edges that aren't longer show its curvature
+_COARSE = 0.6  # the same, where nothing comes of that
 _MOST = 30_000  # vertices of the refined mesh
 _ROUNDS, _STEPS = 12, 60  # of frames, and of multipliers in each
 _BETTER, _VAIN = 0.98, 2  # of the least so far; rounds in a row that don't come below it end the search
@@ -98,20 +104,32 @@ def faired(surface: Surface, radius: float) -> Faired:
             value=radius,
             remedy="Give a smaller radius, or draw the surface anew.",
         )
-    start = _refined(surface, _MESH * radius)
-    fits: list[Quadratics] = []
-    for chosen in (np.ones(len(start.vertices), dtype=bool), ~_on_ground(start)):
-        fits.append(Quadratics(start, chosen))
-        try:
-            return _rounded(start, fits[-1], [radius])
-        except NotConverged as error:
-            refusal = error
-    for fit in fits if len(start.vertices) <= _STAGED else ():
+    tried: list[tuple[Surface, Quadratics]] = []
+    refusals: list[NotConverged] = []
+    for start in _meshes(surface, radius):
+        for chosen in (np.ones(len(start.vertices), dtype=bool), ~_on_ground(start)):
+            tried.append((start, Quadratics(start, chosen)))
+            try:
+                return _rounded(*tried[-1], [radius])
+            except NotConverged as error:
+                refusals.append(error)
+    for start, fit in sorted(tried, key=lambda each: len(each[0].vertices)):
+        if len(start.vertices) > _STAGED:
+            break
         try:
             return _rounded(start, fit, _stages(start, fit, radius))
         except NotConverged:
             continue  # what is told is how it ends without stages
-    raise refusal
+    raise refusals[0]
+
+
+def _meshes(surface: Surface, radius: float) -> Iterator[Surface]:
+    """The surface with sides that show the radius, m, and with coarser ones, unless it is as fine itself."""
+    fine = _refined(surface, _MESH * radius)
+    yield fine
+    coarse = _refined(surface, _COARSE * radius)
+    if len(coarse.vertices) < len(fine.vertices):
+        yield coarse
 
 
 def _stages(start: Surface, fit: Quadratics, radius: float) -> list[float]:
