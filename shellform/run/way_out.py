@@ -29,7 +29,7 @@ MORE = (1.0, 1.5, 2.2)  # times the radius asked for
 _CLOSE = 1.1  # from one radius to the next, at the least
 _NEARER = 1.25  # the same, for a nearer surface than one that was taken
 _SLENDER = 1e-9  # m: less is no change
-_FAR_OFF = 0.2  # of a surface's height, in the mean
+_FAR_OFF, _FARTHEST = 0.2, 0.5  # of a surface's height, in the mean and at most
 
 
 @dataclass(frozen=True)
@@ -142,17 +142,17 @@ def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:
     return (
         f"The nearest surface with which this goes on is {folder / SURFACE}{cad} (in metres"
         f"{f', with {options}' if options else ''}): creases rounded to "
-        f"{radius:.3g} m, {off}{_another(mean, found.before)} (change.png)"
+        f"{radius:.3g} m, {off}{_another(mean, float(found.change.max()), found.before)} (change.png)"
     )
 
 
-def _another(mean: float, before: Surface) -> str:
+def _another(mean: float, most: float, before: Surface) -> str:
     """What else is said of a surface that lies so far, m, off the one that was drawn that it is hardly its
     shape."""
-    share = mean / float(before.size[2])
-    return (
-        f", {100.0 * share:.0f} % of its height: hardly the shape that was drawn" if share > _FAR_OFF else ""
-    )
+    height = float(before.size[2])
+    if mean <= _FAR_OFF * height and most <= _FARTHEST * height:
+        return ""
+    return f", {100.0 * mean / height:.0f} % of its height: hardly the shape that was drawn"
 
 
 def _step(path: Path, surface: Surface) -> str:

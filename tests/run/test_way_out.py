@@ -57,21 +57,25 @@ def test_a_crease_that_no_net_covers_is_rounded_and_the_net_goes_on(tmp_path):
         assert read_surface(cad).area == pytest.approx(read_surface(file).area, rel=0.01)
 
 
-@pytest.mark.parametrize(("mean", "said"), [(0.19, False), (0.21, True)])
+@pytest.mark.parametrize(
+    ("mean", "most", "said"),
+    [(0.19, 0.19, False), (0.21, 0.21, True), (0.19, 0.49, False), (0.19, 0.51, True)],
+)
 def test_a_rounded_surface_far_off_the_drawn_one_is_said_to_be_hardly_its_shape(
-    tmp_path, monkeypatch, mean, said
+    tmp_path, monkeypatch, mean, most, said
 ):
     surface = sheet(gable)
-    height = float(surface.size[2])
+    height, change = float(surface.size[2]), np.full(len(surface.vertices), mean)
+    change[0], change[1] = most, 2.0 * mean - most
 
     def far(surface, radius):
-        return Faired(surface, surface, np.full(len(surface.vertices), mean * height))
+        return Faired(surface, surface, change * height)
 
     monkeypatch.setattr(way_out, "faired", far)
     refusal = InputError("is no shell", where="surface")
     told = with_way_out(refusal, surface, 3.0, tmp_path / "out", lambda surface: None, unheard)
     assert (": hardly the shape that was drawn (change.png)" in told.remedy) == said
-    assert ("in the mean, 21 % of its height" in told.remedy) == said
+    assert (f"in the mean, {100 * mean:.0f} % of its height" in told.remedy) == said
 
 
 def test_a_refusal_stays_as_it_was_where_rounding_helps_nothing(tmp_path):

@@ -183,6 +183,18 @@ def test_what_is_not_rounded_on_a_fine_mesh_is_on_a_coarser_one():
     assert np.percentile(bent, 99) <= 1.0 / radius * 1.15
 
 
+def test_what_loses_three_tenths_of_its_area_is_refused_as_another_surface():
+    """A groined roof of 43 m was rounded to a disc with eight needles for feet."""
+    before = sheet(gable)
+    for share, kept in ((0.71, True), (0.69, False)):
+        after = make_surface(np.sqrt(share) * before.vertices, before.triangles)
+        if kept:
+            fairing._refuse_ruin(before, after, 1.5)
+            continue
+        with pytest.raises(NotConverged, match=r"to 1\.5 m the surface keeps 69 % of its area"):
+            fairing._refuse_ruin(before, after, 1.5)
+
+
 def test_a_mesh_that_shows_the_radius_has_no_coarser_one():
     fine = fairing._refined(sheet(gable), 0.3)
     assert [len(each.vertices) for each in fairing._meshes(fine, 1.5)] == [len(fine.vertices)]

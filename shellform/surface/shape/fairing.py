@@ -60,7 +60,7 @@ from shellform.surface.shape.target import ON_GROUND, Surface, make_surface, rou
 from shellform.surface.shape.triangles import area_vectors, directed_edges, vertex_areas
 
 _MESH = 0.3  # of R: edges that aren't longer show its curvature
-_COARSE = 0.6  # the same, where nothing comes of that
+_COARSE = 0.45  # the same, where nothing comes of that
 _MOST = 30_000  # vertices of the refined mesh
 _ROUNDS, _STEPS = 12, 60  # of frames, and of multipliers in each
 _BETTER, _VAIN = 0.98, 2  # of the least so far; rounds in a row that don't come below it end the search
@@ -74,6 +74,7 @@ _EVEN = 0.3
 _MARGIN = 0.96  # of the cap, at which forms are capped
 _HEAVY = 10.0  # times their area: vertices on the ground
 _RELAXED = 1.6  # over-relaxation
+_LEFT = 0.7  # of its area, at the least: of less feet are left that are drawn out to needles
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,9 +161,9 @@ def _rounded(start: Surface, fit: Quadratics, radii: Sequence[float]) -> Faired:
             residual=radii[-1] * most - 1.0,
             iterations=_ROUNDS * _STEPS,
         )
-    _refuse_folds(start, at, radii[-1])
-    change = np.linalg.norm(at - start.vertices, axis=1)
-    return Faired(make_surface(at, faces, source=start.source), start, change)
+    found = make_surface(at, faces, source=start.source)
+    _refuse_ruin(start, found, radii[-1])
+    return Faired(found, start, np.linalg.norm(at - start.vertices, axis=1))
 
 
 def _at_stage(
@@ -319,12 +320,17 @@ def _halved(points: Reals, faces: Indices, middle: Indices) -> Indices:
     return np.vstack(found)
 
 
-def _refuse_folds(start: Surface, at: Reals, radius: float) -> None:
-    """Raises NotConverged where triangles turned over."""
-    old, new = area_vectors(start.vertices, start.triangles), area_vectors(at, start.triangles)
+def _refuse_ruin(start: Surface, found: Surface, radius: float) -> None:
+    """Raises NotConverged where triangles turned over, or much of the surface is gone."""
+    old, new = (area_vectors(each.vertices, each.triangles) for each in (start, found))
+    what = ""
     if (np.sum(old * new, axis=1) <= 0.0).any():
+        what = "folds over"
+    elif found.area < _LEFT * start.area:
+        what = f"keeps {100.0 * found.area / start.area:.0f} % of its area: it would be another one"
+    if what:
         raise NotConverged(
-            f"Rounded to {radius:.3g} m the surface folds over",
+            f"Rounded to {radius:.3g} m the surface {what}",
             residual=float("nan"),
             iterations=_ROUNDS * _STEPS,
         )
