@@ -38,9 +38,8 @@ to, with D, frames and multipliers made anew: ½ ∫ |p - v + d D|² dA is what 
 the change from the surface as given.
 
 A quadratic sees two rings of neighbours, so that on a fine mesh a change travels slowly across R. Where
-nothing comes of it, a coarser one is tried, before stages, and with stages first: it shows the curvature less
-well, but eight lobes that meet in a point are rounded on a quarter of the vertices alone, in a quarter of the
-time.
+nothing comes of it, a coarser one is tried: it shows the curvature less well, but eight lobes that meet in a
+point are rounded on a quarter of the vertices alone, in a quarter of the time.
 """
 
 from __future__ import annotations
@@ -66,7 +65,7 @@ _ROUNDS, _STEPS = 12, 60  # of frames, and of multipliers in each
 _BETTER, _VAIN = 0.98, 2  # of the least so far; rounds in a row that don't come below it end the search
 _FIRST, _GROWTH = 0.15, 1.4  # of R, the first stage at the least; from one stage to the next
 _STAGE_ROUNDS = 4  # of a stage but the last
-_STAGED = 10_000  # vertices: of more, stages take minutes
+_STAGED = 6000  # vertices: of more, stages take as long as a way out may, and a coarser mesh comes first
 _LOST = 0.05  # of a stage's radius, that is left at one place: no further stage mends that
 # σ, of waves as short as the mesh's sides: with 0.1 scans that are rounded to R are bent to 0.7 R in places,
 # without to 0.4 R, and with 1 coarse meshes to no less than 1.3 R
@@ -105,22 +104,20 @@ def faired(surface: Surface, radius: float) -> Faired:
             value=radius,
             remedy="Give a smaller radius, or draw the surface anew.",
         )
-    tried: list[tuple[Surface, Quadratics]] = []
     refusals: list[NotConverged] = []
     for start in _meshes(surface, radius):
+        fits: list[Quadratics] = []
         for chosen in (np.ones(len(start.vertices), dtype=bool), ~_on_ground(start)):
-            tried.append((start, Quadratics(start, chosen)))
+            fits.append(Quadratics(start, chosen))
             try:
-                return _rounded(*tried[-1], [radius])
+                return _rounded(start, fits[-1], [radius])
             except NotConverged as error:
                 refusals.append(error)
-    for start, fit in sorted(tried, key=lambda each: len(each[0].vertices)):
-        if len(start.vertices) > _STAGED:
-            break
-        try:
-            return _rounded(start, fit, _stages(start, fit, radius))
-        except NotConverged:
-            continue  # what is told is how it ends without stages
+        for fit in fits if len(start.vertices) <= _STAGED else ():
+            try:
+                return _rounded(start, fit, _stages(start, fit, radius))
+            except NotConverged:
+                continue  # what is told is how it ends without stages
     raise refusals[0]
 
 
