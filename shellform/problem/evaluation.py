@@ -380,21 +380,15 @@ def _chained(
     equilibrium is needed there is no `assembly`."""
     shell, design, state = at.shell, at.design, at.state
     cables = len(shell.cable_ends)
-    partial = np.vstack([_dense(each.by_rest_length) for each in measurements])
+    partial = sp.vstack([each.by_rest_length for each in measurements]).toarray()
     if moves_radius:
         partial = np.column_stack([partial, np.concatenate([each.by_radius for each in measurements])])
     if assembly is None:
-        return partial
+        return np.asarray(partial)
     # A column of each candidate cable, empty for the absent ones.
     spread = sp.eye_array(cables, format="csr")[design.present]
     rates = [shell.beams_by_radius(design.radius)] if moves_radius else []
     columns = sp.csc_array(by_rest_length(assembly, state, shell.cables(design)) @ spread)
     response = respond(assembly, state, columns, by_stiffness(assembly, state, *rates))
-    by_state = np.vstack([_dense(each.by_dof)[:, assembly.free] for each in measurements])
+    by_state = sp.vstack([each.by_dof for each in measurements]).tocsc()[:, assembly.free].toarray()
     return gradients(response, by_state, partial)
-
-
-def _dense(rates: sp.csr_array | None) -> Reals:
-    """Derivatives of a complete measurement."""
-    assert rates is not None
-    return np.asarray(rates.toarray())
