@@ -4,9 +4,8 @@ Three looks at the same question, from the tangent K of the equilibrium and its 
 
 Modes. The softest shapes solve K v = w M v with the mass of the implicit dynamic relaxation (1 for a
 translation, the square of an element length for a rotation), by Lanczos iteration with shift-invert about 0:
-each step is one solve with the factor of K. M being diagonal, it iterates in u = sqrt(M) v, whose inner
-product is the plain one. That gives the eigenvalues nearest to 0, which are the lowest where K is positive
-definite. Elsewhere its factor tells how many are negative; where some of them lie farther
+each step is one solve with the factor of K. That gives the eigenvalues nearest to 0, which are the lowest
+where K is positive definite. Elsewhere its factor tells how many are negative; where some of them lie farther
 off, the iteration is made again about a shift below all, from where K - shift M is positive definite.
 
 Linearised critical factor. Between two equilibria at factors f0 < f1 of one load the tangent changes from K0
@@ -27,6 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigsh
 
 from shellform.arrays import Reals, Record
@@ -93,11 +93,12 @@ def modes(assembly: Assembly, state: State, count: int) -> Modes:
     except NotPositiveDefinite:
         indefinite = assembly.matrix.factor_indefinite(values)
         solve, negative = indefinite.solve, indefinite.negative
-    mass = ResidualNorm(assembly).mass_shape
-    stiffness, vectors = _nearest(solve, mass, count)
+    shape = ResidualNorm(assembly).mass_shape
+    tangent, mass = assembly.matrix.full(values), sp.diags_array(shape).tocsc()
+    stiffness, vectors = _nearest(tangent, solve, mass, count)
     if (stiffness < 0.0).sum() < negative:
-        solve, shift = _from_below(assembly, values, mass, float(np.abs(stiffness).max()))
-        stiffness, vectors = _nearest(solve, mass, count, shift)
+        solve, shift = _from_below(assembly, values, shape, float(np.abs(stiffness).max()))
+        stiffness, vectors = _nearest(tangent, solve, mass, count, shift)
     order = np.argsort(stiffness)
     flat = np.zeros((count, 6 * assembly.count))
     flat[:, assembly.free] = vectors[:, order].T
@@ -199,24 +200,25 @@ def _start(size: int) -> Reals:
 
 
 @counts_as(Work.EIGENVECTORS)
-def _nearest(
-    solve: Callable[[Reals], Reals], mass: Reals, count: int, shift: float = 0.0
+def _nearest(  # type: ignore[no-untyped-def]
+    tangent: sp.csc_array, solve, mass: sp.csc_array, count: int, shift: float = 0.0
 ) -> tuple[Reals, Reals]:
-    """The `count` eigenvalues of (K, M) nearest to the `shift`, and their vectors (f, count); `mass` (f,) is
-    M's diagonal, `solve` is with K - shift M."""
-    size, root = len(mass), np.sqrt(mass)
-
-    def inverse(u: Reals) -> Reals:
-        return np.asarray(root * solve(root * u))
-
+    """The `count` eigenvalues of (K, M) nearest to the `shift`, and their vectors (f, count); `solve` is with
+    K - shift M."""
+    size = tangent.shape[0]
     if size <= max(_DENSE, 2 * count + 2):
-        found, vectors = np.linalg.eigh([inverse(u) for u in np.eye(size)])
-        nearest = np.argsort(-np.abs(found))[:count]
-        return shift + 1.0 / found[nearest], vectors[:, nearest] / root[:, None]
+        root = 1.0 / np.sqrt(mass.diagonal())
+        values, vectors = np.linalg.eigh(root[:, None] * tangent.toarray() * root)
+        nearest = np.argsort(np.abs(values - shift))[:count]
+        return values[nearest], root[:, None] * vectors[:, nearest]
+    inverse = LinearOperator((size, size), matvec=solve, dtype=float)
     try:
-        found, vectors = eigsh(
-            LinearOperator((size, size), matvec=inverse, dtype=float),
+        values, vectors = eigsh(
+            tangent,
             count,
+            M=mass,
+            sigma=shift,
+            OPinv=inverse,
             v0=_start(size),
             ncv=min(size, max(_DENSE, 2 * count + 8)),
             tol=_SHARP,
@@ -226,4 +228,4 @@ def _nearest(
             f"The modes were not found: {error}",
             remedy="Ask for fewer modes, or for those of a state farther from its limit.",
         ) from error
-    return shift + 1.0 / found, vectors / root[:, None]
+    return values, vectors
