@@ -34,7 +34,13 @@ class ChordKeeper:
         self.ends = np.vstack([part.ends for part in beams]) if beams else np.zeros((0, 2), dtype=np.int64)
         if not len(self.ends):
             return
-        self.weight = np.concatenate([part.axial / part.rest_length for part in beams])
+        weight = self.weight = np.concatenate([part.axial / part.rest_length for part in beams])
+        rows = np.arange(len(self.ends))
+        incidence = sp.coo_array(
+            (np.repeat([-1.0, 1.0], len(rows)), (np.tile(rows, 2), self.ends.T.ravel())),
+            shape=(len(rows), count),
+        ).tocsr()
+        laplacian = sp.csc_array(sp.csr_array(incidence.T.tocsr() * weight) @ incidence)
         # Axes with the same supports share a factor; with pinned supports all three do.
         nodes_of = [free[free % 6 == axis] // 6 for axis in range(3)]
         together: list[list[int]] = []
@@ -44,22 +50,12 @@ class ChordKeeper:
         self.axes: list[tuple[Indices, Indices, Factor]] = []
         for group in together:
             nodes = nodes_of[group[0]]
-            block = self._laplacian(count, nodes)
+            block = sp.csc_array(
+                sp.tril(laplacian[nodes][:, nodes] + _ANCHOR * weight.max() * sp.eye_array(len(nodes)))
+            )
+            block.sort_indices()
             family = Symmetric(block.indptr.astype(np.int64), block.indices.astype(np.int64))
             self.axes.append((nodes, np.array(group), family.factor_thin(block.data)))
-
-    def _laplacian(self, count: int, nodes: Indices) -> sp.csc_array:
-        """The lower triangle (f, f) of B' w B for the free `nodes` (f,) of all `count`, anchored."""
-        number = np.full(count, -1)
-        number[nodes] = np.arange(len(nodes))
-        (one, other), weight = number[self.ends].T, self.weight
-        rows = np.concatenate([one, other, np.maximum(one, other), np.arange(len(nodes))])
-        columns = np.concatenate([one, other, np.minimum(one, other), np.arange(len(nodes))])
-        anchor = np.full(len(nodes), _ANCHOR * weight.max())
-        values, free = np.concatenate([weight, weight, -weight, anchor]), columns >= 0
-        lower = sp.csc_array((values[free], (rows[free], columns[free])), shape=(len(nodes), len(nodes)))
-        lower.sort_indices()
-        return lower
 
     def largest_turn(self, before: State, after: State) -> float:
         """The largest angle, rad, between a beam's chord in one state and in the other."""
