@@ -124,12 +124,14 @@ class Evaluator:
         self._far = np.inf
 
     def begin(self, followed: Mapping[str, Loaded] | None = None) -> dict[str, Loaded]:
-        """Loads the start design step by step, where it isn't known what that comes to (`followed`), sets the
-        objective's weights, and returns how far each load case came. Raises NotConverged where the design
-        load snaps through, InputError where a term can't be weighed.
+        """Loads the start design step by step, under loads of which it isn't known what it comes to
+        (`followed`), sets the objective's weights, and returns how far each load case came. Raises
+        NotConverged where the design load snaps through, InputError where a term can't be weighed.
         """
-        known = followed or follow(self.shell, self.start, self.problem.loads)
-        reached = {name: known[name] for name in self.problem.loads}
+        known, loads = dict(followed or {}), self.problem.loads
+        others = {name: load for name, load in loads.items() if name not in known}
+        known |= follow(self.shell, self.start, others) if others else {}
+        reached = {name: known[name] for name in loads}
         for each in reached.values():
             self._count(each.factorisations)
         first = reached[self.base]

@@ -89,6 +89,21 @@ def test_a_start_that_was_followed_before_is_not_again_and_counts_the_same(evalu
     assert evaluator.weights == ("start", own)
 
 
+def test_a_start_is_followed_under_the_loads_alone_that_nobody_followed_it_under(evaluator, monkeypatch):
+    """A limit may ask for a load that no load case has, such as that of a critical factor."""
+    paths = {"wet": reached(0.1), "wetter": reached(0.2), "wind": reached(0.3)}
+    asked = []
+
+    def follow(shell, start, loads):
+        asked.append(dict(loads))
+        return {name: paths[name] for name in loads}
+
+    monkeypatch.setattr(evaluation, "start_weights", lambda *given: given[1:])
+    monkeypatch.setattr(evaluation, "follow", follow)
+    assert list(evaluator.begin({"wet": paths["wet"]}).items()) == list(paths.items())
+    assert asked == [{name: evaluator.problem.loads[name] for name in ("wetter", "wind")}]
+
+
 def test_terms_of_a_changed_problem_that_were_measured_in_the_same_states_are_not_again(
     evaluator, monkeypatch
 ):

@@ -151,7 +151,7 @@ def test_a_stage_that_fails_leaves_the_others_to_be_made_and_is_made_by_the_next
     def failing(*_):
         raise InputError("is full", where=stage)
 
-    monkeypatch.setattr(optimising, "optimise", lambda workspace, shell, loads, summary: summary)
+    monkeypatch.setattr(optimising, "optimise", lambda workspace, shell, loads, summary, initial: summary)
     if stage == "figures":
         monkeypatch.setattr(run, "_documents", nothing_made)
     with monkeypatch.context() as broken:
