@@ -99,10 +99,8 @@ class Factoriser:
         self, indptr: Indices, indices: Indices, *, definite: bool = True, kept: Indices | None = None
     ) -> None:
         self.size = len(indptr) - 1
-        self._kind = _POSITIVE_DEFINITE if definite else _INDEFINITE
         # The lower triangle by columns is the upper one by rows, which is what PARDISO reads.
-        self._rows, self._columns = indptr.astype(np.int32), indices.astype(np.int32)
-        self._handle = np.zeros(64, dtype=np.int64)
+        rows, self._columns = indptr.astype(np.int32), indices.astype(np.int32)
         self._settings = np.zeros(64, dtype=np.int32)
         put = self._settings
         put[0] = 1  # iparm(1): these settings, not the defaults
@@ -115,18 +113,18 @@ class Factoriser:
         if not definite:
             put[9] = 12  # iparm(10): pivots below 1e-12 of the largest entry are lifted to it
             put[20] = 1  # iparm(21): Bunch and Kaufman's pivots
-        self._kept = np.zeros(1, dtype=np.int32)
+        listed = np.zeros(1, dtype=np.int32)
         self._complement = np.zeros((0, 0))
         if kept is not None:
             put[35] = 1  # iparm(36): the Schur complement of what the list of degrees of freedom marks
-            self._kept = np.zeros(self.size, dtype=np.int32)
-            self._kept[kept] = 1
+            listed = np.zeros(self.size, dtype=np.int32)
+            listed[kept] = 1
             self._complement = np.zeros((len(kept), len(kept)))
         self._none = np.zeros(1)
         self._values = self._none
         self._analysed = False
-        kept_as = self._handle, self._settings, self._rows, self._columns, self._kept
-        self._fixed = _Fixed(self._kind, self.size, *kept_as)
+        kind = _POSITIVE_DEFINITE if definite else _INDEFINITE
+        self._fixed = _Fixed(kind, self.size, self._settings, rows, self._columns, listed)
         self._finalizer = weakref.finalize(self, _release, self._fixed)
 
     def factor(self, values: Reals) -> None:
@@ -203,15 +201,15 @@ class _Fixed:
         self,
         kind: int,
         size: int,
-        handle: _Integers,
         settings: _Integers,
         rows: _Integers,
         columns: _Integers,
-        kept: _Integers,
+        listed: _Integers,
     ) -> None:
-        self.size, self.begun = size, handle
-        self._held = settings, rows, columns, kept  # as long as their places are known
-        self.handle, self.settings, self.kept = _at(handle), _at(settings), _at(kept)
+        self.size = size
+        self.begun: _Integers = np.zeros(64, dtype=np.int64)  # PARDISO's own places
+        self._held = settings, rows, columns, listed  # as long as their places are known
+        self.handle, self.settings, self.listed = _at(self.begun), _at(settings), _at(listed)
         self.rows, self.columns = _at(rows), _at(columns)
         self.kind, self.order = ctypes.byref(ctypes.c_int(kind)), ctypes.byref(ctypes.c_int(size))
 
@@ -229,7 +227,7 @@ def _pardiso(fixed: _Fixed, phase: int, values: Reals, count: int, right: Reals,
     before = mkl.MKL_Set_Num_Threads_Local(threads)
     mkl.PARDISO(
         fixed.handle, _ONE, _ONE, fixed.kind, ref(step), fixed.order, _at(values),
-        fixed.rows, fixed.columns, fixed.kept,
+        fixed.rows, fixed.columns, fixed.listed,
         ref(sides), fixed.settings, _QUIET, _at(right), _at(solution), ref(error),
     )  # fmt: skip
     mkl.MKL_Set_Num_Threads_Local(before)
