@@ -137,8 +137,10 @@ def _to_nearest(
     folder = _unused(output.with_name(f"{output.stem}-{BUILDABLE}"))
     tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
 
-    def nearest_of(surface: Surface, shares: Sequence[float]) -> Nearest | None:
-        return nearest_buildable(surface, refusal.radius, folder, again, say, shares, lambda: again.options)
+    def nearest_of(
+        surface: Surface, shares: Sequence[float], then: Callable[[Surface, float], None] = again
+    ) -> Nearest | None:
+        return nearest_buildable(surface, refusal.radius, folder, then, say, shares, lambda: again.options)
 
     nearest = nearest_of(surface, tried)
     if nearest is None and uncut is not surface and not again.begun:
@@ -148,8 +150,7 @@ def _to_nearest(
         again.go_on()
         nearest = nearest_of(surface, [again.best.share])
     if nearest is None and again.thin is not None:
-        again.take_thin()
-        nearest = nearest_of(surface, [again.thin.share])
+        nearest = nearest_of(surface, [again.thin.share], again.take_thin)
     if nearest is None:
         return None
     assert again.design is not None
@@ -211,7 +212,7 @@ class _Rounded:
         self.options = ""  # of the command, that stand for it
         self.best = _Brief(0.0, wish, 0.0)
         self.thin: _Thin | None = None
-        self._thorough = self._takes_thin = False
+        self._thorough = False
         self.begun = False  # whether any surface was tried
         self._covered = False
         self._say = say
@@ -230,9 +231,10 @@ class _Rounded:
         self._thorough = True
         self._brief = self._walled = self._whole.rest(1.0, thin_layers=True)
 
-    def take_thin(self) -> None:
-        """What is known to stand, which isn't looked for again."""
-        self._takes_thin = True
+    def take_thin(self, surface: Surface, share: float) -> None:
+        """What is known to stand on the surface, rounded to such a share, which isn't looked for again."""
+        assert self.thin is not None
+        self._take(self.thin.design, self.thin.wish, _above_plinths(surface))
 
     def __call__(self, surface: Surface, share: float) -> None:
         """Raises InputError or NotConverged where no design stands on the surface, rounded to such a share of
@@ -240,11 +242,7 @@ class _Rounded:
         self.begun, stands = True, self.design is not None
         if stands and self._brief.left < _SPARE * self._brief.work:
             raise _untried("a rounder one stands and most of the work is done")
-        plinths = plinths_for(surface)  # which whoever follows gets too
-        surface = surface if plinths is None else plinths.surface
-        if self._takes_thin and self.thin is not None:
-            self._take(self.thin.design, self.thin.wish, surface)
-            return
+        surface = _above_plinths(surface)
         wish = self.best.wish if self._thorough else self.wish
         how = "rounded, thoroughly" if self._thorough else "rounded"
         try:
@@ -281,6 +279,12 @@ class _Rounded:
         self.wish, layer = _with_layer(self.wish, surface, design)
         self.options = f"{self.options} {layer}".strip()
         self.design = design
+
+
+def _above_plinths(surface: Surface) -> Surface:
+    """The surface above the plinths that whoever follows gets too."""
+    plinths = plinths_for(surface)
+    return surface if plinths is None else plinths.surface
 
 
 def _trial(
