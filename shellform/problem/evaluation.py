@@ -381,14 +381,13 @@ def _chained(
     """Total derivatives (g, c) by all rest lengths, and (g, c + 1) by the radius where it moves; where no
     equilibrium is needed there is no `assembly`."""
     shell, design, state = at.shell, at.design, at.state
-    cables = len(shell.cable_ends)
     partial = sp.vstack([each.by_rest_length for each in measurements]).toarray()
     if moves_radius:
         partial = np.column_stack([partial, np.concatenate([each.by_radius for each in measurements])])
     if assembly is None:
         return np.asarray(partial)
     # A column of each candidate cable, empty for the absent ones.
-    spread = sp.eye_array(cables, format="csr")[design.present]
+    spread = sp.eye_array(len(shell.cable_ends), format="csr")[design.present]
     rates = [shell.beams_by_radius(design.radius)] if moves_radius else []
     columns = sp.csc_array(by_rest_length(assembly, state, shell.cables(design)) @ spread)
     response = respond(assembly, state, columns, by_stiffness(assembly, state, *rates))

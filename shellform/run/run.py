@@ -312,7 +312,7 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
         workspace.say("initial", f"loading the {name} design", Kind.BEGAN)
         reached = designs.followed(shell, design, loads)
         summary = designs.keep(workspace, shell, name, design, reached, loads, summary)
-    parts = replace(parts, initial=reached)
+    parts = replace(parts, initial=reached)  # the last one's
     first = summary.designs["initial"].loads["design"]
     span = max(_there(summary.surface).size[:2])
     if not first.on_branch or first.deviation_max > 0.1 * span:

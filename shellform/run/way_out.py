@@ -142,17 +142,17 @@ def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:
     return (
         f"The nearest surface with which this goes on is {folder / SURFACE}{cad} (in metres"
         f"{f', with {options}' if options else ''}): creases rounded to "
-        f"{radius:.3g} m, {off}{_another(mean, float(found.change.max()), found.before)} (change.png)"
+        f"{radius:.3g} m, {off}{_another(found)} (change.png)"
     )
 
 
-def _another(mean: float, most: float, before: Surface) -> str:
-    """What else is said of a surface that lies so far, m, off the one that was drawn that it is hardly its
+def _another(found: Faired) -> str:
+    """What else is said of a surface that lies so far off the one that was drawn that it is hardly its
     shape."""
-    height = float(before.size[2])
-    if mean <= _FAR_OFF * height and most <= _FARTHEST * height:
+    off = found.change / found.before.size[2]
+    if off.mean() <= _FAR_OFF and off.max() <= _FARTHEST:
         return ""
-    return f", {100.0 * mean / height:.0f} % of its height: hardly the shape that was drawn"
+    return f", {100.0 * off.mean():.0f} % of its height: hardly the shape that was drawn"
 
 
 def _step(path: Path, surface: Surface) -> str:

@@ -105,20 +105,23 @@ def faired(surface: Surface, radius: float) -> Faired:
             remedy="Give a smaller radius, or draw the surface anew.",
         )
     refusals: list[NotConverged] = []
+    for start, fit, radii in _attempts(surface, radius):
+        try:
+            return _rounded(start, fit, radii)
+        except NotConverged as error:
+            refusals.append(error)
+    raise refusals[0]  # how it ends on the fine mesh, all of it capped, without stages
+
+
+def _attempts(surface: Surface, radius: float) -> Iterator[tuple[Surface, Quadratics, list[float]]]:
+    """Meshes of the surface, what of each is capped, and the radii, m, to which it is rounded in turn."""
     for start in _meshes(surface, radius):
         fits: list[Quadratics] = []
         for chosen in (np.ones(len(start.vertices), dtype=bool), ~_on_ground(start)):
             fits.append(Quadratics(start, chosen))
-            try:
-                return _rounded(start, fits[-1], [radius])
-            except NotConverged as error:
-                refusals.append(error)
+            yield start, fits[-1], [radius]
         for fit in fits if len(start.vertices) <= _STAGED else ():
-            try:
-                return _rounded(start, fit, _stages(start, fit, radius))
-            except NotConverged:
-                continue  # what is told is how it ends without stages
-    raise refusals[0]
+            yield start, fit, _stages(start, fit, radius)
 
 
 def _meshes(surface: Surface, radius: float) -> Iterator[Surface]:
