@@ -54,7 +54,7 @@ from shellform.gridshell.tolerances import SOURCES, Tolerances
 from shellform.surface.readers.reading import ENDINGS
 from shellform.written import encoded
 
-_SURFACES = {".py", *ENDINGS} - {".json"}  # models are JSON, too
+_SURFACES = {".py", *ENDINGS}
 _NAME = 255  # bytes, of a file or folder on the systems in use
 _RodEntry = Annotated[
     Annotated[OwnRodEntry, Tag("own")] | Annotated[StockRodEntry, Tag("stock")],
@@ -146,18 +146,22 @@ def read_toml(file: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except OSError as error:
+        there = "Name a file that is there, or lay one with: shellform example vault (of a study: study)."
+        kept = file / "case.toml"
         raise InputError(
             unreadable(error),
             where=str(file),
-            remedy="Name a file that is there, or lay one with: shellform example vault (of a study: study).",
+            remedy=f"The case that a run is of lies in its folder: {kept}." if kept.is_file() else there,
         ) from error
     except ValueError as error:  # TOMLDecodeError, and Python's for a number of thousands of digits
-        if file.suffix.lower() in _SURFACES:
+        suffix = file.suffix.lower()
+        if suffix in _SURFACES:
+            kind = "JSON" if suffix == ".json" else "a surface file"  # models are JSON, too
             made = shlex.quote(f"{file.stem}.toml")
             raise InputError(
-                "is a surface file, no TOML",
+                f"is {kind}, no TOML",
                 where=str(file),
-                remedy=f"Make a case for it: shellform new {shlex.quote(str(file))} --output {made}.",
+                remedy=f"Make a case for the surface in it: shellform new {shlex.quote(str(file))} --output {made}.",
             ) from error
         if isinstance(error, UnicodeDecodeError):
             raise InputError(

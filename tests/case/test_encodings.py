@@ -70,12 +70,28 @@ def test_what_is_no_utf_8_is_told_with_its_line(tmp_path, content):
             read(tmp_path / name)
 
 
-@pytest.mark.parametrize("name", ["shell.stl", "my shell.OBJ", "shell.py"])
-def test_a_surface_in_place_of_a_case_is_told_how_to_make_one(tmp_path, name):
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("shell.stl", "a surface file"),
+        ("my shell.OBJ", "a surface file"),
+        ("shell.py", "a surface file"),
+        ("session.json", "JSON"),
+    ],
+)
+def test_a_surface_in_place_of_a_case_is_told_how_to_make_one(tmp_path, name, kind):
     for content in (b"o shell\nv 0 0 0\n", b"\x83\x00\xff"):
         (tmp_path / name).write_bytes(content)
-        with pytest.raises(InputError, match="is a surface file, no TOML") as refused:
+        with pytest.raises(InputError, match=f"is {kind}, no TOML") as refused:
             load_case(tmp_path / name)
         told = shlex.split(refused.value.remedy.partition(": ")[2].removesuffix("."))
         made = name.partition(".")[0] + ".toml"
         assert told == ["shellform", "new", str(tmp_path / name), "--output", made]
+
+
+def test_the_folder_of_a_run_in_place_of_a_case_is_told_where_its_case_lies(tmp_path):
+    with pytest.raises(InputError, match=r"can't be read: Is a directory\. Name a file"):
+        load_case(tmp_path)
+    (tmp_path / "case.toml").write_text("")
+    with pytest.raises(InputError, match=r"lies in its folder: .*case\.toml"):
+        load_case(tmp_path)
