@@ -77,9 +77,14 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
 
 
 def refuse_unwritable(path: str | Path) -> None:
-    """Raises InputError where `write_named` could make no file, before what it is to hold is computed."""
+    """Raises InputError where `write_named` could write no file, before what it is to hold is computed."""
+    if _is_no_file(Path(path)) or _is_standard_output(Path(path)):
+        return
     target = Path(os.path.realpath(path))
-    partial = _beside(target)
+    if target.is_dir():
+        raise InputError("is a folder, no file", where=str(path), remedy="Name a file in it.")
+    there = next(each for each in target.parents if each.exists())  # writing makes the folders below it
+    partial = there / _beside(target).name
     try:
         with _made(partial):
             partial.unlink()

@@ -13,7 +13,16 @@ import pytest
 
 from shellform.arrays import read_arrays
 from shellform.errors import InputError
-from shellform.written import clear, is_partial, make_folder, whole, write_arrays, write_named, write_text
+from shellform.written import (
+    clear,
+    is_partial,
+    make_folder,
+    refuse_unwritable,
+    whole,
+    write_arrays,
+    write_named,
+    write_text,
+)
 
 
 def test_a_file_takes_its_place_when_it_is_whole(tmp_path):
@@ -165,6 +174,17 @@ def test_what_cannot_be_written_into_is_told_and_stays(tmp_path, monkeypatch):
         with pytest.raises(InputError, match=r"^socket: can't be written: .*Give the name of a file"):
             write_named("socket", "words")
     assert stat.S_ISSOCK(os.stat("socket").st_mode)
+
+
+def test_where_nothing_could_be_written_is_told_before_anything_is_computed(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    for place, told in (("file/in.json", "can't be written: Not a directory"), (".", "is a folder, no file")):
+        with pytest.raises(InputError, match=told):
+            refuse_unwritable(tmp_path / place)
+    for place in (pipe(tmp_path / "pipe"), tmp_path / "file", tmp_path / "new.json", tmp_path / "new/a.json"):
+        refuse_unwritable(place)
+    assert (tmp_path / "file").read_text() == "mine"
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["file", "pipe"]
 
 
 def test_a_link_is_followed_where_it_is_named_and_else_replaced(tmp_path):

@@ -52,11 +52,11 @@ def analyse(
     from shellform.structure.answers.results import read_sections
     from shellform.structure.model import read_model
     from shellform.structure.solve.memory import limited_to_free_memory
-    from shellform.written import refuse_overwriting, write_named
+    from shellform.written import refuse_overwriting, refuse_unwritable, write_named
 
-    if output is not None and output.is_dir():
-        raise InputError("is a folder, no file", where=str(output), remedy="Name a file in it.")
-    refuse_overwriting([] if output is None else [output], (model, sections))
+    if output is not None:
+        refuse_overwriting([output], (model, sections))
+        refuse_unwritable(output)
     with Spinner() as report:
         known = read_sections(sections) if sections is not None else None
         with limited_to_free_memory():
