@@ -28,6 +28,7 @@ from shellform.net.cover import BarePatch as BarePatch
 from shellform.net.cover import Cover as Cover
 from shellform.net.grid import Grid as Grid
 from shellform.net.grid import GridRod as GridRod
+from shellform.net.limits import NetLimits as NetLimits
 from shellform.net.net import EdgeLine as EdgeLine
 from shellform.net.net import Net as Net
 from shellform.net.net import Stretch as Stretch

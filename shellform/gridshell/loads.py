@@ -1,11 +1,11 @@
 """Dead loads on the net's nodes, (n, 6), N and N·m: weights act along -z, and a load case is a sum of factors
 times parts.
 
-Concrete, membrane and reinforcement weigh on their true area of the target surface (areas.py); a joint's
-share acts on its upper rod, a support's goes into the ground there and counts in the reaction only. Rods
-weigh half an element on each of its nodes, joints half on each rod. Table 1 of the paper is contained: with
-lengths times s and the density of what is poured divided by s the load on an area stays, and that on a node
-grows with s².
+Concrete, membrane and reinforcement weigh on their true area of what is built of the target surface
+(areas.py); a joint's share acts on its upper rod, a support's goes into the ground there and counts in the
+reaction only. Rods weigh half an element on each of its nodes, joints half on each rod. Table 1 of the paper
+is contained: with lengths times s and the density of what is poured divided by s the load on an area stays,
+and that on a node grows with s².
 """
 
 from __future__ import annotations
@@ -80,14 +80,25 @@ class Region:
 EVERYWHERE = Region()
 
 
-def lying(surface: Surface, region: Region) -> Reals:
-    """The part of the surface in the region, as triangles (t, 3, 3), m. Raises InputError where nothing is
+def built(net: Net, surface: Surface) -> Reals:
+    """What is built of the surface, as triangles (t, 3, 3), m: beyond the level or the outline at which the
+    net ends nothing is."""
+    limits, triangles = net.limits, facets(surface)
+    if limits.ground is not None:
+        triangles = between(triangles, np.array([0.0, 0.0, 1.0]), limits.ground, np.inf)
+    if limits.plan is not None:
+        triangles = _parted(triangles, limits.plan, "net.outline")[0]
+    return triangles
+
+
+def lying(triangles: Reals, region: Region) -> Reals:
+    """The part in the region of what is built, triangles (t, 3, 3), m. Raises InputError where nothing is
     left.
     """
-    triangles = facets(surface)
+    corners = triangles.reshape(-1, 3)
     if region.half is not None:
         direction = _plan(region.half)
-        along = surface.vertices @ direction
+        along = corners @ direction
         triangles = between(triangles, direction, 0.5 * float(along.min() + along.max()), np.inf)
     if region.strip is not None:
         triangles = between(triangles, _plan(region.strip[0]), *region.strip[1:])
@@ -105,8 +116,8 @@ def lying(surface: Surface, region: Region) -> Reals:
         raise InputError(
             "no part of the surface is loaded",
             where="load",
-            remedy=f"The surface reaches from {coordinates(surface.vertices.min(axis=0))} to "
-            f"{coordinates(surface.vertices.max(axis=0))} m.",
+            remedy=f"What is built of the surface reaches from {coordinates(corners.min(axis=0))} to "
+            f"{coordinates(corners.max(axis=0))} m.",
         )
     return triangles
 
@@ -149,19 +160,21 @@ def refuse_bulk(surface: Surface, thickness: float, *, where: str) -> None:
 
 
 def area_load(net: Net, surface: Surface, weight: float, region: Region = EVERYWHERE) -> Reals:
-    """Load (n, 6) of a `weight`, N/m² of the surface, in the region. It adds up to the weight times the
-    region's area.
+    """Load (n, 6) of a `weight`, N/m² of the surface, in the region. It adds up to the weight times the area
+    of what is built there.
     """
     require_number(weight, above=0.0, where="load.weight", give="N/m², such as 120")
     carried = (
-        _carried_everywhere(net, surface) if region is EVERYWHERE else tributary(net, lying(surface, region))
+        _carried_everywhere(net, surface)
+        if region is EVERYWHERE
+        else tributary(net, lying(built(net, surface), region))
     )
     return _down(weight * carried)
 
 
 @lru_cache(maxsize=1)  # every thickness that is tried lies on one net
 def _carried_everywhere(net: Net, surface: Surface) -> Reals:
-    return reals("areas", tributary(net, lying(surface, EVERYWHERE)), (None,))
+    return reals("areas", tributary(net, lying(built(net, surface), EVERYWHERE)), (None,))
 
 
 def concrete(

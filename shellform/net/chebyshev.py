@@ -11,7 +11,7 @@ part of it bare (cover.py), rods of a single joint stay too, if less is with the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -24,6 +24,7 @@ from shellform.net.compass import Finder, covering_lattice
 from shellform.net.cover import NOTABLE, UNCOVERED, Cover, cover, refuse_bare
 from shellform.net.grid import Grid, lattice_grid
 from shellform.net.lattice_origin import origin_at, origin_of_guides
+from shellform.net.limits import NetLimits
 from shellform.net.net import Net
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.pull import (
@@ -42,7 +43,7 @@ from shellform.net.pull import (
 )
 from shellform.net.quality import measure, nearness, refuse_distance, refuse_folds
 from shellform.net.refusal import NoNet, Reason
-from shellform.net.trim import FEWEST, Limits, Trimmed, Uncovered, bare_rods, trim
+from shellform.net.trim import FEWEST, Trimmed, Uncovered, bare_rods, trim
 from shellform.quantities import LENGTHS, MILLIMETRES, if_other_unit
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import dense_on_one
@@ -220,13 +221,14 @@ def net_at(
         except Uncovered as error:
             bare = error.rods
             continue
-        return _net(finder, grid, pulled, trimmed, covered, settings.uncovered_max)
+        net = _net(finder, grid, pulled, trimmed, covered, settings.uncovered_max)
+        return replace(net, limits=limits)
     raise _short(bare, angle)
 
 
-def _limits(settings: NetSettings) -> Limits:
+def _limits(settings: NetSettings) -> NetLimits:
     outline = settings.outline
-    return Limits(settings.ground, None if outline is None else reals("net.outline", outline, (None, 2)))
+    return NetLimits(settings.ground, None if outline is None else reals("net.outline", outline, (None, 2)))
 
 
 def _check(surface: Surface, settings: NetSettings) -> None:

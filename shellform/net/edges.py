@@ -27,13 +27,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from shellform.arrays import Reals, Record, reals
+from shellform.arrays import Flags, Reals, Record, reals
 from shellform.errors import InputError, require_known
 from shellform.net.ground import Ground, ground_under
 from shellform.net.net import EdgeLine, Net, Stretch
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.polylines import nearest
-from shellform.net.rims import End, Rim, edges_of, ends_of
+from shellform.net.rims import OFF, End, Rim, edges_of, ends_of
 from shellform.quantities import coordinates
 from shellform.structure.elements.rotation import from_matrices
 from shellform.structure.elements.state import State
@@ -115,7 +115,7 @@ def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals 
         for first, last in _runs(rim.kinds):
             if rim.kinds[first] == "beam":
                 builder.beam(rim, first, last, [each for each in ends if each.rim == number])
-        stretches += _stretches(rim)
+        stretches += _stretches(rim, _cut_off(net, rim))
     held = [each.node for each in ends if rims[each.rim].kinds[each.vertex] in HELD]
     if not held and not builder.feet:
         raise InputError(
@@ -157,8 +157,14 @@ def stretches_of(surface: Surface, edges: Edges = Edges()) -> tuple[Stretch, ...
     ground, found = ground_under(surface, edges.ground), list[Stretch]()
     for rim in edges_of(surface):
         _sort_out(rim, edges, ground)
-        found += _stretches(rim)
+        found += _stretches(rim, np.zeros(len(rim.points), dtype=bool))
     return tuple(found)
+
+
+def _cut_off(net: Net, rim: Rim) -> Flags:
+    """Which (k,) of the rim's points lie where nothing is built: so far beyond the level or the outline at
+    which the net ends that no rod's end counts as on the rim there."""
+    return net.limits.beyond(rim.points) > OFF * net.grid.scale
 
 
 def _refuse_missed(edges: Edges, rims: Sequence[Rim]) -> None:
@@ -231,18 +237,26 @@ def _runs(kinds: Sequence[str]) -> list[tuple[int, int]]:
     return [(a, b - 1) for a, b in zip(starts, [*starts[1:], starts[0] + count], strict=True)]
 
 
-def _stretches(rim: Rim) -> list[Stretch]:
-    """The rim's runs of one kind and name; along a curve where the net was cut off from its first point to
-    its last."""
+def _stretches(rim: Rim, cut_off: Flags) -> list[Stretch]:
+    """The rim's runs of one kind and name, but for those of points (k,) that are `cut_off`; along a curve
+    where the net was cut off from its first point to its last."""
     count = len(rim.points)
-    labels = [f"{kind}\n{name}" for kind, name in zip(rim.kinds, rim.names, strict=True)]
+    labels = [
+        "" if off else f"{kind}\n{name}"
+        for kind, name, off in zip(rim.kinds, rim.names, cut_off.tolist(), strict=True)
+    ]
     runs = _runs(labels)
     if rim.cut:
         starts = [0, *(k for k in range(1, count - 1) if labels[k] != labels[k - 1])]
         runs = [(first, next_one - 1) for first, next_one in pairwise([*starts, count - 1])]
     found = []
     for first, last in runs:
+        if not labels[first % count]:
+            continue
         at = np.arange(first, last + 2) % count  # up to where the next one begins
+        at = at[~cut_off[at]]
+        if len(at) < 2:
+            continue
         whole = not rim.cut and last - first + 1 == count
         found.append(Stretch(rim.kinds[first], rim.names[first], rim.points[at], rim.opening, whole))
     return found

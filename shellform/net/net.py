@@ -10,6 +10,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.net.cover import Cover
 from shellform.net.grid import Grid, crossing_points
+from shellform.net.limits import NO_LIMITS, NetLimits
 from shellform.net.notes import NetNote
 from shellform.net.quality import Quality
 from shellform.net.refusal import Attempt
@@ -70,6 +71,7 @@ class Net(Record):
     - `attempts` at it, the last of which gave it; none where the first did.
     - `edges`: the edge beams; `stretches`: what the edge is, part after part (none: not asked).
     - `cover`: where it leaves the surface bare (None: not known of older ones).
+    - `limits`: where it ends besides the surface's edge.
     """
 
     grid: Grid
@@ -81,6 +83,7 @@ class Net(Record):
     edges: tuple[EdgeLine, ...] = ()
     stretches: tuple[Stretch, ...] = ()
     cover: Cover | None = None
+    limits: NetLimits = NO_LIMITS
 
     def __post_init__(self) -> None:
         count = self.node_count

@@ -16,7 +16,7 @@ from shellform.structure.elements.rotation import matrices
 from shellform.surface.shape.target import Surface
 from shellform.surface.shape.tree import Tree
 
-_OFF = 0.5  # of the spacing: an end farther from the surface's edge was cut off by a level or an outline
+OFF = 0.5  # of the spacing: an end farther from the surface's edge was cut off by a level or an outline
 _BACK = 0.5  # of its length: what comes nearer to its beginning goes round
 _APART = 2.5  # of the spacing: where a net was cut off, ends farther from one another are on two edges
 
@@ -65,7 +65,7 @@ def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End
     a = np.vstack(curves)
     b = np.vstack([np.roll(each, -1, axis=0) for each in curves])
     piece, closest, away = Tree(np.stack([a, b, b], axis=1)).nearest(middle)
-    cut = np.flatnonzero(away > _OFF * net.grid.scale)
+    cut = np.flatnonzero(away > OFF * net.grid.scale)
     found = []
     order: dict[int, tuple[int, int]] = {}
     if len(cut):

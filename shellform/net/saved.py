@@ -13,6 +13,7 @@ from shellform.arrays import read_arrays
 from shellform.errors import ANEW, InputError
 from shellform.net.cover import BarePatch, Cover
 from shellform.net.grid import Grid, GridRod
+from shellform.net.limits import NetLimits
 from shellform.net.net import EdgeLine, Net, Stretch
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.quality import MAPS, Quality
@@ -77,6 +78,7 @@ def save_net(path: Path, net: Net) -> None:
                     "gap": grid.gap,
                     "quality": net.quality.summary(),
                     **({} if net.cover is None else {"cover": asdict(net.cover)}),
+                    **({} if net.limits.ground is None else {"ground": net.limits.ground}),
                     "notes": [[note.kind.value, note.text] for note in net.notes],
                     "indices": [rod.index for rod in grid.rods],
                     **({"attempts": [_row(each) for each in net.attempts]} if net.attempts else {}),
@@ -89,6 +91,8 @@ def save_net(path: Path, net: Net) -> None:
             )
         ),
     }
+    if net.limits.plan is not None:
+        arrays["outline"] = net.limits.plan
     for k, line in enumerate(net.edges):
         arrays[f"edge_{k}_nodes"], arrays[f"edge_{k}_clamps"] = line.nodes, line.clamps
     for k, stretch in enumerate(net.stretches):
@@ -152,6 +156,7 @@ def load_net(path: Path) -> Net:
             supports=data["supports"],
             quality=quality,
             cover=_cover(meta["cover"]) if "cover" in meta else None,
+            limits=NetLimits(meta.get("ground"), data.get("outline")),
             notes=notes,
             attempts=attempts,
             edges=edges,

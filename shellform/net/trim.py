@@ -15,12 +15,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals, Record
+from shellform.arrays import Indices, Reals, Record
 from shellform.errors import how_many
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, GridRod
+from shellform.net.limits import NetLimits
 from shellform.net.notes import NetNote, NoteKind
-from shellform.net.polylines import closed, inside, nearest
 from shellform.net.refusal import NoNet, Reason
 from shellform.structure.elements.rotation import between, matrices
 from shellform.structure.elements.state import State
@@ -78,43 +78,16 @@ class Trimmed(Record):
     notes: tuple[NetNote, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Limits(Record):
-    """Where rods end besides the surface's edge: the `ground`, m, below which nothing is built, and the
-    corners of a closed curve in `plan` (k, 2), m, outside which nothing is."""
-
-    ground: float | None = None
-    plan: Reals | None = None
-
-    def past(self, finder: Finder, points: Reals) -> Reals:
-        """How far (k,), m, points on the net lie past the nearest limit; negative inside."""
-        return np.maximum(finder.past_edge(finder.foot(points)), self._beyond(points))
-
-    def within(self, points: Reals) -> Flags:
-        """Which (k,) of points on the surface lie within the ground's level and the curve."""
-        return self._beyond(points) < 0.0
-
-    def _beyond(self, points: Reals) -> Reals:
-        result = np.full(len(points), -np.inf)
-        if self.ground is not None:
-            result = np.maximum(result, self.ground - points[:, 2])
-        if self.plan is not None:
-            plan = points[:, :2]
-            away, _ = nearest(plan, closed(self.plan))
-            result = np.maximum(result, np.where(inside(plan, self.plan), -away, away))
-        return np.asarray(result)
-
-
 def trim(
-    grid: Grid, state: State, finder: Finder, *, merge: float, limits: Limits, fewest: int = FEWEST
+    grid: Grid, state: State, finder: Finder, *, merge: float, limits: NetLimits, fewest: int = FEWEST
 ) -> Trimmed:
     """The part of the pulled `grid` inside the surface's edge and the `limits`; joints nearer to them than
     `merge` spacings are left out, and so are rods with less than the `fewest` joints.
 
     Raises Uncovered where the grid isn't large enough, InputError where nothing useful remains.
     """
-    past = limits.past(finder, state.positions)
-    pieces = _cut(grid, state, past, lambda points: limits.past(finder, points))
+    past = _past(finder, limits, state.positions)
+    pieces = _cut(grid, state, past, lambda points: _past(finder, limits, points))
     bare = sum(piece.start < 0.0 or piece.end < 0.0 for piece in pieces)
     if bare:
         raise Uncovered(bare)
@@ -122,12 +95,17 @@ def trim(
     return _rebuild(grid, state, kept, notes)
 
 
-def bare_rods(grid: Grid, state: State, finder: Finder, limits: Limits) -> int:
+def bare_rods(grid: Grid, state: State, finder: Finder, limits: NetLimits) -> int:
     """How many pieces of rods end on the surface, short of any limit."""
     return sum(
         (first == 0) + (last + 1 == len(rod.nodes)) > 0
-        for rod, first, last in _runs(grid, limits.past(finder, state.positions))
+        for rod, first, last in _runs(grid, _past(finder, limits, state.positions))
     )
+
+
+def _past(finder: Finder, limits: NetLimits, points: Reals) -> Reals:
+    """How far (k,), m, points on the net lie past the edge or the nearest limit; negative inside."""
+    return np.maximum(finder.past_edge(finder.foot(points)), limits.beyond(points))
 
 
 def _runs(grid: Grid, past: Reals) -> list[tuple[GridRod, int, int]]:

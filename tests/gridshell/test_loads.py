@@ -94,7 +94,7 @@ def test_the_areas_on_a_sphere_s_cap_add_up_and_rings_follow_archimedes():
     for low, high in [(np.cos(0.6), 0.9), (0.9, 0.95), (0.95, 1.0)]:
         zone = areas.areas(areas.between(triangles, [0.0, 0.0, 1.0], low, high)).sum()
         assert zone == pytest.approx(2.0 * np.pi * (high - low), rel=2e-3)
-    rings = [loads.lying(surface, Region(ring=ring)) for ring in [(0.0, 0.9), (0.9, 2.0)]]
+    rings = [loads.lying(areas.facets(surface), Region(ring=ring)) for ring in [(0.0, 0.9), (0.9, 2.0)]]
     assert sum(areas.areas(ring).sum() for ring in rings) == pytest.approx(surface.area, rel=1e-12)
 
 

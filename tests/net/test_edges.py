@@ -340,3 +340,31 @@ def test_rods_beside_an_opening_that_go_on_beyond_it_stay():
     assert max(free) > 2.5
     assert (len(net.grid.rods), len(net.grid.lattice)) == (35, 180), "four of a single joint stay"
     assert not any("beside the edge" in each.text for each in net.notes)
+
+
+@pytest.mark.parametrize(
+    ("cut", "kept"),
+    [
+        ({"outline": [(-0.2, -0.5), (0.2, -0.5), (0.2, 0.5), (-0.2, 0.5)]}, 0.5),
+        ({"ground": 0.08}, None),
+    ],
+)
+def test_what_lies_beyond_a_level_or_an_outline_is_no_edge_and_loads_nothing(
+    vault_of_two_arches, tmp_path, cut, kept
+):
+    """A barrel of 0.8 m, of which the middle half is built, or what lies above a level."""
+    surface, whole = vault_of_two_arches
+    outline = None if "outline" not in cut else np.array(cut["outline"])
+    net = stand(pulled(surface, **cut), surface, Edges(ground=cut.get("ground")), outline=outline)
+    save_net(tmp_path / "net.npz", net)
+    for each in (net, load_net(tmp_path / "net.npz")):
+        load = sf.loads.concrete(each, surface, thickness=0.003, density=2400.0)
+        area = -load[:, 2].sum() / (9.81 * 0.003 * 2400.0)
+        assert area == pytest.approx(net.cover.area, rel=1e-2), "which is sampled"
+        if kept is not None:
+            assert area == pytest.approx(kept * surface.area, rel=1e-9)
+        points = np.vstack([stretch.points for stretch in each.stretches])
+        assert (net.limits.beyond(points) <= 0.5 * net.spacing).all()
+    assert sf.loads.concrete(whole, surface, thickness=0.003)[:, 2].sum() == pytest.approx(
+        -9.81 * 0.003 * 2500.0 * surface.area
+    )

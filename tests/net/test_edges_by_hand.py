@@ -13,6 +13,8 @@ from shellform.net.rims import End, Rim, _chains, _reached, edges_of, ends_of, r
 from shellform.structure.elements.rotation import matrices
 from shellform.surface.shape.target import make_surface
 
+NOWHERE = np.zeros(5, dtype=bool)  # cut off
+
 
 def test_a_place_holds_where_all_that_is_given_does_its_bounds_included():
     points = np.array([[0.0, 0.0, 1.0], [2.0, 0.0, 2.0], [5.0, 3.0, 3.0], [2.0, -1.0, 3.5]])
@@ -121,13 +123,26 @@ def test_the_ends_of_a_curve_along_which_a_net_was_cut_off_are_no_part_of_a_beam
 def test_the_stretches_of_a_curve_along_which_a_net_was_cut_off_end_with_it():
     made = sorted_out([0.0, 0.0, 2.0, 2.0, 0.0], cut=True)
     made.kinds = ["ground", "ground", "beam", "beam", "free"]
-    first, second = module._stretches(made)
+    first, second = module._stretches(made, NOWHERE)
     assert [(each.kind, each.whole) for each in (first, second)] == [("ground", False), ("beam", False)]
     assert first.points[:, 0].tolist() == [0.0, 1.0, 2.0]
     assert second.points[:, 0].tolist() == [2.0, 3.0, 4.0], "and not back to its beginning"
     made.kinds = ["ground"] * 5
-    (one,) = module._stretches(made)
+    (one,) = module._stretches(made, NOWHERE)
     assert (one.length, one.whole) == (pytest.approx(2.0 * np.hypot(1.0, 2.0) + 2.0), False)
+
+
+def test_no_stretch_lies_where_nothing_is_built():
+    made = sorted_out([0.0, 0.0, 5.0, 5.0, 5.05])
+    made.kinds = ["ground", "ground", "beam", "beam", "beam"]
+    first, second = module._stretches(made, np.array([False, False, False, False, True]))
+    assert first.points[:, 0].tolist() == [0.0, 1.0, 2.0]
+    assert second.points[:, 0].tolist() == [2.0, 3.0]
+    assert module._stretches(made, np.array([True, False, True, True, True])) == [], "a point is none"
+    made.kinds = ["free"] * 5
+    (only,) = module._stretches(made, np.array([True, False, False, False, False]))
+    assert not only.whole
+    assert only.points[:, 0].tolist() == [1.0, 2.0, 3.0, 4.0]
 
 
 def test_runs_go_round_a_loop_and_the_last_may_lie_past_its_end():
@@ -139,14 +154,14 @@ def test_runs_go_round_a_loop_and_the_last_may_lie_past_its_end():
 def test_stretches_reach_to_where_the_next_one_begins_and_one_all_round_is_whole():
     made = sorted_out([0.0, 0.0, 5.0, 5.0, 5.05])
     made.kinds = ["ground", "ground", "beam", "beam", "beam"]
-    first, second = module._stretches(made)
+    first, second = module._stretches(made, NOWHERE)
     assert [(each.kind, each.whole) for each in (first, second)] == [("ground", False), ("beam", False)]
     assert first.points[:, 0].tolist() == [0.0, 1.0, 2.0]
     assert second.points[:, 0].tolist() == [2.0, 3.0, 4.0, 0.0]
     made.kinds = ["pin", "ground", "ground", "ground", "pin"]
-    assert [each.whole for each in module._stretches(made)] == [False, False]
+    assert [each.whole for each in module._stretches(made, NOWHERE)] == [False, False]
     made.kinds = ["free"] * 5
-    (only,) = module._stretches(made)
+    (only,) = module._stretches(made, NOWHERE)
     assert only.whole
     assert only.points[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 0.0]
 
