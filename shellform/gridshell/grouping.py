@@ -22,7 +22,7 @@ from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Gridshell
 
 _SYMMETRIES = ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))  # signs of x and y in two mirrors and the half turn
-_TOLERANCE = 0.02  # of the spacing, within which a cable's middle has to lie on its image's
+_TOLERANCE = 0.02  # of the spacing, within which the image of each cable's end has to lie on another's
 _PATCH = 4  # cells of a patch along each direction of rods
 
 
@@ -30,15 +30,19 @@ def symmetric_groups(shell: Gridshell) -> Indices:
     """A group number (c,) for every candidate cable. Raises InputError where the net has no symmetry that
     joins any.
     """
-    middle = shell.target.positions[shell.cable_ends].mean(axis=1)
+    places, ends = _ends(shell)
     plan = np.ptp(shell.net.crossings[:, :2], axis=0) / 2.0 + shell.net.crossings[:, :2].min(axis=0)
-    tree, reach = cKDTree(middle), _TOLERANCE * shell.net.spacing
-    count, joined = len(middle), []
+    tree, reach = cKDTree(places), _TOLERANCE * shell.net.spacing
+    count, joined = len(ends), list[Indices]()
+    number = {(a, b): k for k, (a, b) in enumerate(np.sort(ends, axis=1).tolist())}
     for sign in _SYMMETRIES:
-        image = middle.copy()
-        image[:, :2] = plan + np.array(sign) * (middle[:, :2] - plan)
-        away, which = tree.query(image)
-        if (away <= reach).all():
+        image = places.copy()
+        image[:, :2] = plan + np.array(sign) * (places[:, :2] - plan)
+        away, there = tree.query(image)
+        if (away > reach).any():
+            continue
+        which = [number.get((a, b), -1) for a, b in np.sort(there[ends], axis=1).tolist()]
+        if min(which) >= 0:
             joined.append(np.column_stack([np.arange(count), which]))
     if not joined:
         raise InputError(
@@ -51,6 +55,17 @@ def symmetric_groups(shell: Gridshell) -> Indices:
     pairs = np.vstack(joined)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _ends(shell: Gridshell) -> tuple[Reals, Indices]:
+    """The places (k, 3), m, at which cables end, and the two of each cable (c, 2): of a crossing the middle
+    between its rods, for a mirror changes which of them lies above."""
+    place = shell.target.positions.copy()
+    place[shell.net.grid.crossing_nodes] = shell.net.crossings[:, None]
+    own = np.arange(len(place))
+    own[shell.net.grid.crossing_nodes] = shell.net.grid.crossing_nodes[:, :1]
+    used, ends = np.unique(own[shell.cable_ends], return_inverse=True)
+    return place[used], ends.reshape(-1, 2)
 
 
 def patches(shell: Gridshell) -> Indices:
