@@ -116,6 +116,8 @@ def climbed_net(
             if not near:
                 refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
+            if error.reason is Reason.BESIDE and not attempts:
+                raise
             taken = error.iterations if isinstance(error, Stalled) else error.factorisations
             attempts.append(Attempt(rung.change, turned, shifted, error.reason, taken))
             progress(attempts[-1].sentence())

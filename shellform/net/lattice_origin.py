@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Reals, Record, reals
 from shellform.errors import InputError
 from shellform.net.compass import Finder, Guide, raised
+from shellform.net.refusal import NoNet, Reason
 from shellform.surface.shape.target import Surface
 from shellform.surface.shape.triangles import triangle_areas
 
@@ -64,8 +65,9 @@ def _on_surface(surface: Surface, finder: Finder, plan: Reals, where: str) -> tu
     point = _above(surface, finder, plan)
     foot = finder.foot(point[None])
     if finder.past_outline(foot)[0] > 0.0:
-        raise InputError(
-            "the net's origin lies off the surface",
+        raise NoNet(
+            Reason.BESIDE,
+            Reason.BESIDE.value,
             where=where,
             value=plan.round(4).tolist(),
             remedy="Choose a smaller offset, or guides that cross on the surface.",

@@ -25,6 +25,7 @@ class Reason(Enum):
     NEAR = "crossings come nearer than their spacing"
     EMPTY = "no rod keeps two joints"
     BARE = "too much of the surface lies beyond the rods"
+    BESIDE = "the net's origin lies off the surface"
 
 
 class NoNet(InputError):

@@ -219,3 +219,22 @@ def test_a_net_that_creases_bring_nearer_than_its_spacing_says_so_and_is_none_wh
     monkeypatch.setattr("shellform.net.ladder.LADDER", rungs)
     with pytest.raises(NoNet, match="nearer than their spacing"):
         climbed_net(umbrella, SETTINGS, angle=math.pi / 4, near=False)
+
+
+def test_a_rung_whose_origin_lies_off_the_surface_is_one_attempt_and_not_the_end():
+    """Half a spacing from the middle of an L lies in its bend, where nothing is."""
+    whole = sheet(lambda x, y: 0.3 - 0.3 * (x**2 + y**2), size=1.0, count=41)
+    middles = whole.vertices[whole.triangles].mean(axis=1)
+    bend = whole.triangles[~((middles[:, 0] > 0.0) & (middles[:, 1] > 0.0))]
+    used, triangles = np.unique(bend, return_inverse=True)
+    surface = make_surface(whole.vertices[used], triangles.reshape(-1, 3))
+    settings = NetSettings(spacing=0.2, gap=0.002, elements=2, tuning=NetTuning(limit=2))
+    said = []
+    with pytest.raises(Stalled, match=r"ended: .*origin lies off the surface") as refused:
+        climbed_net(surface, settings, angle=0.0, progress=said.append)
+    assert "offset" not in refused.value.remedy
+    assert any("origin lies off" in each for each in said[:-1])
+    assert "from the flat grid" in said[-1]
+    with pytest.raises(InputError, match=r"net\.offset: the net's origin lies off the surface") as given:
+        climbed_net(surface, settings, angle=0.0, offset=(0.7, 0.7))
+    assert "smaller offset" in given.value.remedy
