@@ -26,6 +26,7 @@ _CORRECTIONS = 2  # of what a small diagonal costs the formula in digits
 _EXACT = 1e-12  # of the right side, below which nothing is left to correct
 
 _PART = 4096  # variables
+_FEW = 200  # variables: of so many the formula may lose what a dense matrix keeps, where nothing is curved
 _QUIETLY = partial(np.errstate, over="ignore", invalid="ignore")
 _Linear = Callable[[Reals], Reals]
 # from the bounds' weights (s,) and the constraints' (k,) to the solution of the condensed system
@@ -57,8 +58,27 @@ def minimise_quadratic(
     free = lower < upper
     if not free.all():
         return _of_the_free(free, hessian, slope, rows, values, lower, upper)
+    asked = slope, rows, values, lower, upper
+    if isinstance(hessian, np.ndarray):
+        return _least(*_dense(hessian, rows), *asked)
+    found = _least(*_low_rank(hessian, rows), *asked)
+    if found is None and len(slope) <= _FEW:
+        return _least(*_dense(hessian.columns @ hessian.columns.T, rows), *asked)
+    return found
+
+
+def _least(
+    curved: _Linear,
+    condensed: _Condensed,
+    slope: Reals,
+    rows: Reals,
+    values: Reals,
+    lower: Reals,
+    upper: Reals,
+) -> Reals | None:
+    """The same in variables that are all free, by products with the curvature and solutions of the condensed
+    systems."""
     size = len(slope)
-    curved, condensed = _dense(hessian, rows) if isinstance(hessian, np.ndarray) else _low_rank(hessian, rows)
 
     def limits(x: Reals) -> Reals:
         return np.concatenate([x, -x, rows @ x])

@@ -11,7 +11,7 @@ from shellform.optimiser import proposal
 from shellform.optimiser.guards import WholeGuard
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.proposal import propose
-from shellform.optimiser.quadratic import LowRank
+from shellform.optimiser.quadratic import LowRank, minimise_quadratic
 from shellform.optimiser.solver import SequentialConvex
 from shellform.optimiser.trials import task
 from tests.problems import misfit_and_force
@@ -420,3 +420,21 @@ def test_cables_alike_change_their_lengths_by_the_same():
     assert held == pytest.approx([0.075, -1.0, 0.6], abs=1e-4)
     broken = step([-1.0, 1.0, 0.0], rows=np.array([[0.0, 0.0, 1.0]]), values=np.array([0.3]))
     assert broken == pytest.approx([0.0, -1.0, 0.0], abs=1e-4), "what is broken may stay so"
+
+
+def test_a_problem_of_few_variables_with_hardly_any_curvature_has_the_answer_of_its_dense_matrix():
+    """Of these problems one has no answer by the formula for few columns."""
+    rng = np.random.default_rng(1)
+    solved = 0
+    for _ in range(120):
+        size, rank, count = (int(rng.integers(*span)) for span in ((2, 40), (0, 5), (0, 8)))
+        columns, slope = rng.normal(size=(size, rank)), rng.normal(size=size)
+        rows, values = rng.normal(size=(count, size)), rng.normal(size=count) - 0.5
+        rest = slope, rows, values, -rng.random(size), rng.random(size)
+        dense, few = (minimise_quadratic(each, *rest) for each in (columns @ columns.T, LowRank(columns)))
+        assert (dense is None) == (few is None)
+        if dense is not None:
+            least = [slope @ u + 0.5 * ((columns.T @ u) ** 2).sum() for u in (dense, few)]
+            assert least[1] == pytest.approx(least[0], rel=1e-5, abs=1e-6)
+            solved += 1
+    assert solved > 60
