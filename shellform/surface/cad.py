@@ -44,6 +44,8 @@ _DEFAULT_EDGES = 60.0  # along the longer plan extent
 _BUILT_EDGES = 90.0  # along the largest dimension of a builder script
 _SAMPLES = 33  # points on each edge curve that a fitted surface passes through
 _FITTED = 1000  # about as many vertices a fitted surface passes through
+_AT_FIRST = 250  # the same of a quick one, which tells whether that is worth its time: …
+_HOPELESS = 10.0  # … not where it is so many times as far off as it may be
 _SEGMENTS = 100  # of a fitted B-spline along u and v
 _TOGETHER = 200  # patches that are made in one model
 _CORNER = np.cos(np.deg2rad(30.0))  # an edge that turns more has a corner there
@@ -292,6 +294,7 @@ def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) ->
         raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")
     give = "a share of the surface's size, such as 0.001"
     require_number(within, above=0.0, below=1.0, where="within", give=give, share=True)
+    most = within * float(surface.size.max())
     loops = surface.boundary
     if len(loops) > 1:
         raise InputError(
@@ -299,36 +302,43 @@ def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) ->
             where=surface.source,
             remedy="Close them (surface.fill), or write a mesh.",
         )
-    inner = np.setdiff1d(np.arange(len(surface.vertices)), loops[0])
-    # One vertex a cell of a grid in space: evenly spread, whatever the mesh.
-    cell = max(math.sqrt(surface.area / _FITTED), 1e-12 * float(surface.size.max()))
-    chosen = inner[np.unique(np.floor(surface.vertices[inner] / cell), axis=0, return_index=True)[1]]
     with session(), errors(file, "gmsh can't fit a surface", "Write a mesh."):
-        occ = gmsh.model.occ
-        curves = []
-        rim = [occ.addPoint(*point) for point in surface.vertices[loops[0]]]
-        for stretch in _stretches(surface.vertices[loops[0]]):
-            ends = [rim[k % len(rim)] for k in stretch]
-            curves.append(occ.addSpline(ends) if len(ends) > 2 else occ.addLine(*ends))
-        wire = occ.addWire(curves)
-        points = [occ.addPoint(*surface.vertices[k]) for k in chosen]
-        face = occ.addSurfaceFilling(
-            wire, pointTags=points, degree=3, numPointsOnCurves=_SAMPLES, maxSegments=_SEGMENTS
-        )
-        occ.remove([(0, point) for point in points])
-        occ.synchronize()
-        closest = np.reshape(gmsh.model.getClosestPoint(2, face, surface.vertices[inner].ravel())[0], (-1, 3))
-        off = float(np.linalg.norm(closest - surface.vertices[inner], axis=1).max(initial=0.0))
-        if off > within * float(surface.size.max()):
-            raise NotConverged(
-                f"The fitted surface is {off:.2g} m off", residual=off, remedy="Write a mesh instead."
-            )
-        if kind == "iges":
-            occ.dilate(occ.getEntities(), 0.0, 0.0, 0.0, *3 * (_IGES_UNITS,))
-            occ.synchronize()
-        with silence():
-            gmsh.write(str(file))
-    return off
+        off = _fit(surface, _AT_FIRST)
+    if off <= _HOPELESS * most:
+        with session(), errors(file, "gmsh can't fit a surface", "Write a mesh."):
+            off = _fit(surface, _FITTED)
+            if off <= most:
+                if kind == "iges":
+                    gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, *3 * (_IGES_UNITS,))
+                    gmsh.model.occ.synchronize()
+                with silence():
+                    gmsh.write(str(file))
+                return off
+    raise NotConverged(f"The fitted surface is {off:.2g} m off", residual=off, remedy="Write a mesh instead.")
+
+
+def _fit(surface: Surface, count: int) -> float:
+    """Makes a B-spline surface through the edge of a surface without openings and about so many of its
+    vertices, and tells how far the others are off it, m."""
+    occ, edge = gmsh.model.occ, surface.boundary[0]
+    inner = np.setdiff1d(np.arange(len(surface.vertices)), edge)
+    # One vertex a cell of a grid in space: evenly spread, whatever the mesh.
+    cell = max(math.sqrt(surface.area / count), 1e-12 * float(surface.size.max()))
+    chosen = inner[np.unique(np.floor(surface.vertices[inner] / cell), axis=0, return_index=True)[1]]
+    curves = []
+    rim = [occ.addPoint(*point) for point in surface.vertices[edge]]
+    for stretch in _stretches(surface.vertices[edge]):
+        ends = [rim[k % len(rim)] for k in stretch]
+        curves.append(occ.addSpline(ends) if len(ends) > 2 else occ.addLine(*ends))
+    wire = occ.addWire(curves)
+    points = [occ.addPoint(*surface.vertices[k]) for k in chosen]
+    face = occ.addSurfaceFilling(
+        wire, pointTags=points, degree=3, numPointsOnCurves=_SAMPLES, maxSegments=_SEGMENTS
+    )
+    occ.remove([(0, point) for point in points])
+    occ.synchronize()
+    closest = np.reshape(gmsh.model.getClosestPoint(2, face, surface.vertices[inner].ravel())[0], (-1, 3))
+    return float(np.linalg.norm(closest - surface.vertices[inner], axis=1).max(initial=0.0))
 
 
 def _stretches(edge: Reals) -> list[range]:

@@ -313,6 +313,22 @@ def test_a_thrust_shell_written_as_cad_comes_back_within_a_thousandth(tmp_path, 
     assert back.area == pytest.approx(shell.area, rel=1e-4)
 
 
+@pytest.mark.parametrize(("at_first", "tried"), [(11.0, [250]), (9.0, [250, 1000])])
+def test_a_fit_that_a_quick_one_shows_to_be_hopeless_is_not_tried(tmp_path, monkeypatch, at_first, tried):
+    """In times what it may be off."""
+    shell = thrust_shell(SQUARE, supports=CORNERS, rise=3.0, size=0.5)
+    most, asked = 1e-3 * shell.size.max(), []
+
+    def fit(_surface, count):
+        asked.append(count)
+        return (at_first if count == 250 else 2.0) * most
+
+    monkeypatch.setattr(cad, "_fit", fit)
+    with pytest.raises(NotConverged, match="m off"):
+        cad.write_fitted(tmp_path / "shell.step", shell)
+    assert asked == tried
+
+
 def test_what_one_b_spline_can_not_be_is_not_written(tmp_path):
     shell = thrust_shell(SQUARE, rise=3.0, size=0.5)
     with pytest.raises(NotConverged, match="m off"):
