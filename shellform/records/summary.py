@@ -378,9 +378,11 @@ def _refuse_newer(path: Path, head: _Head) -> None:
 
 
 def outdated(summary: Summary, stage: str) -> Summary:
-    """Without what a stage and those after it will find anew."""
+    """Without what a stage and those after it will find anew, and the times that they took."""
+    spent = {name: each for name, each in summary.seconds.items() if name in STAGES[: STAGES.index(stage)]}
+    summary = replace(summary, seconds=spent).totalled()
     if STAGES.index(stage) <= STAGES.index("initial"):
-        summary = replace(summary, designs={}, verdict=None)
+        summary = replace(summary, model=None, designs={}, verdict=None)
     if STAGES.index(stage) <= STAGES.index("optimise"):
         summary = replace(
             summary.without_designs(("unloaded", "optimised", "rounded", "polished")), optimisation=None

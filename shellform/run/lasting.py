@@ -46,9 +46,9 @@ def lasting(folder: Path, done: StagesDone, summary: Summary) -> StagesDone:
 
 
 def take_away(folder: Path, stage: str) -> None:
-    """Takes away what shows what a `stage` and those after it will find anew, but for pictures of designs,
-    which go with these. What was told on site stays."""
-    at, gone = STAGES.index(stage), list[Path]()
+    """Takes away what shows what a `stage` and those after it will find anew, the page first, but for
+    pictures of designs, which go with these. What was told on site stays."""
+    at, gone = STAGES.index(stage), [folder / PAGE]
     if at <= STAGES.index("net"):
         gone += folder.glob("figures/net-*")
     if at <= STAGES.index("optimise"):

@@ -107,7 +107,9 @@ def test_what_shows_a_design_that_is_made_anew_is_taken_away_and_what_was_told_o
     told = ["schedules/erection.csv", "schedules/belief-1.npz"]
     for name in ("figures/failure.png", "schedules/edge_beams.csv", "models/gridshell.step", *told):
         (copy / name).touch()
+    assert (copy / "report.html").is_file()
     take_away(copy, stage)
+    assert not (copy / "report.html").exists(), "it tells of what is made anew"
     shown = ("figures/net-skew.png", "figures/deviations.png", "figures/failure.png", "drawings/grid.pdf",
              "schedules/edge_beams.csv", "models/gridshell.step", "schedules/rods.csv")  # fmt: skip
     assert [name for name in shown if (copy / name).is_file()] == stay
@@ -120,7 +122,11 @@ def test_a_run_with_other_rods_that_ends_early_keeps_no_drawings_of_those_before
     run_case(small_case(ROOT, "rod.radius=0.0009"), copy, until="initial")
     assert not list((copy / "drawings").iterdir())
     assert not (copy / "schedules/rods.csv").exists()
-    assert read_summary(copy).documents is None
+    assert not (copy / "report.html").exists()
+    left = read_summary(copy)
+    assert left.documents is None
+    assert set(left.seconds) == {"surface", "net", "initial", "total"}
+    assert left.seconds["total"] == pytest.approx(sum(left.seconds.values()) / 2.0)
 
 
 def test_where_nothing_was_done_nothing_is_missing(tmp_path):

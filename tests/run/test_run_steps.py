@@ -31,7 +31,10 @@ def test_what_a_stage_and_those_after_it_find_anew_is_outdated_and_nothing_befor
     given = replace(
         summary(names), designs=dict.fromkeys(names, examined), verdict=VERDICT, optimisation=optimisation()
     )
+    given = replace(given, seconds={**dict.fromkeys(STAGES, 2.0), "total": 2.0 * len(STAGES)})
     left, at = module.outdated(given, stage), STAGES.index(stage)
+    assert left.seconds == {**dict.fromkeys(STAGES[:at], 2.0), "total": 2.0 * at}
+    assert (left.model is None) == (at <= STAGES.index("initial"))
     if at <= STAGES.index("initial"):
         assert left.designs == {}
     elif stage == "optimise":
