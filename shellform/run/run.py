@@ -65,6 +65,7 @@ from shellform.surface.shape.target import Surface
 from shellform.work_clock import listening
 from shellform.written import make_folder, write_text
 
+_EXCESS = 0.1  # of the larger side, that a node of the initial design may be off
 _T = TypeVar("_T")
 
 
@@ -158,7 +159,7 @@ def _run_alone(workspace: Workspace, fresh: bool, parts: Parts, began: float) ->
         parts = Parts(surface=load_surface(workspace.path("surface.npz"), workspace.case.surface.file))
         refuse_beside(workspace.case, _there(parts.surface))
     if workspace.sketch:
-        refuse_over_full(folder)
+        refuse_over_full(folder, fresh=fresh)
     summary = read_summary(folder) if done.keys else Summary()
     if "report" not in done.keys or any(stage not in SHOWING for stage in summary.failed):
         (folder / FILE).unlink(missing_ok=True)  # which tells of an end that may be none now
@@ -313,16 +314,27 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
         reached = designs.followed(shell, design, loads)
         summary = designs.keep(workspace, shell, name, design, reached, loads, summary)
     parts = replace(parts, initial=reached)  # the last one's
-    first = summary.designs["initial"].loads["design"]
-    span = max(_there(summary.surface).size[:2])
-    if not first.on_branch or first.deviation_max > 0.1 * span:
-        raise NotConverged(
-            "The initial design deforms excessively under the design load "
-            f"({1e3 * first.deviation_max:.0f} mm); its states are kept in {workspace.path('states')}",
-            remedy="Choose a denser grid (net.spacing), thicker rods "
-            f"({rod_sizes(case.rod, shell.rod).named}) or stiffer cables (cable.stiffness).",
-        )
+    _refuse_excess(workspace, shell, summary)
     return _Ended(parts, summary)
+
+
+def _refuse_excess(workspace: Workspace, shell: Gridshell, summary: Summary) -> None:
+    """Raises NotConverged where the initial design deforms so much that no search would mend it."""
+    case, loads = workspace.case, summary.designs["initial"].loads
+    first, most = loads["design"], _EXCESS * max(_there(summary.surface).size[:2])
+    if first.on_branch and first.deviation_max <= most:
+        return
+    remedy = (
+        "Choose a denser grid (net.spacing), thicker rods "
+        f"({rod_sizes(case.rod, shell.rod).named}) or stiffer cables (cable.stiffness)."
+    )
+    if "none" in loads and loads["none"].deviation_max > most:  # cables pull it out of shape
+        remedy = f"It does so without any load: give a cable.rest_ratio nearer to 1 than {case.cable.rest_ratio:g}."
+    raise NotConverged(
+        "The initial design deforms excessively under the design load "
+        f"({1e3 * first.deviation_max:.0f} mm); its states are kept in {workspace.path('states')}",
+        remedy=remedy,
+    )
 
 
 def _optimise(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:

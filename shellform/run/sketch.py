@@ -39,9 +39,15 @@ def sketched(case: Case) -> Case:
     return case.model_copy(update={"net": net, "optimise": optimise, "cable": cable, "safety": safety})
 
 
-def refuse_over_full(folder: Path) -> None:
-    """Raises InputError for a folder with designs of a full job."""
-    summary = read_summary(folder) if (folder / SUMMARY).is_file() else Summary()
+def refuse_over_full(folder: Path, *, fresh: bool) -> None:
+    """Raises InputError for a folder with designs of a full job, and for a damaged summary, of which nobody
+    knows, but where it is to be made `fresh`."""
+    try:
+        summary = read_summary(folder) if (folder / SUMMARY).is_file() else Summary()
+    except InputError:
+        if not fresh:
+            raise
+        return
     if summary.designs and not summary.sketch:
         raise InputError(
             "holds a full run, which a sketch would replace",

@@ -81,6 +81,12 @@ def test_thicker_rods_of_a_catalogue_are_advised_by_the_entry_that_such_a_case_h
         run_case(case, tmp_path / "run", until="initial")
 
 
+def test_cables_that_pull_the_grid_out_of_shape_without_any_load_are_advised_to_be_longer(tmp_path):
+    case = small_case(ROOT, "cable.rest_ratio=0.2", "cable.stiffness=1000.0")
+    with pytest.raises(NotConverged, match=r"deforms excessively.*cable\.rest_ratio nearer to 1 than 0\.2"):
+        run_case(case, tmp_path / "run", until="initial")
+
+
 def test_what_was_found_before_the_end_is_told_in_millimetres_and_degrees():
     design = made.design("additional", stable=False)
     told = dict(facts(Summary(surface=made.SURFACE, net=made.NET, designs={"initial": design})))

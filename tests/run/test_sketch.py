@@ -13,7 +13,7 @@ from shellform.run.judged import judged, run_checks
 from shellform.run.keys import stage_keys
 from shellform.run.pages import write_report
 from shellform.run.run import run_case
-from shellform.run.sketch import PICTURE, sketched
+from shellform.run.sketch import PICTURE, refuse_over_full, sketched
 from tests.command import shellform
 from tests.run.small_run import begin, small_case
 
@@ -85,6 +85,13 @@ def test_a_full_job_after_a_sketch_is_the_same_as_without_and_a_sketch_does_not_
     with pytest.raises(InputError, match="holds a full run, which a sketch would replace"):
         run_case(small_case(ROOT, *SETTINGS), tmp_path / "run", sketch=True)
     assert (tmp_path / "run/stages.json").read_bytes() == before
+
+
+def test_a_damaged_sketch_is_made_anew_where_that_is_asked_for(tmp_path):
+    (tmp_path / "summary.json").write_text('{"format": "shellform run"', encoding="utf-8")
+    with pytest.raises(InputError):
+        refuse_over_full(tmp_path, fresh=False)
+    refuse_over_full(tmp_path, fresh=True)
 
 
 def test_the_command_names_the_picture(sketch):
