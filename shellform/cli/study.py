@@ -12,7 +12,7 @@ import typer
 
 from shellform.cli.interruption import heed
 from shellform.cli.options import Json, Quiet, Scripts
-from shellform.errors import InputError
+from shellform.errors import InputError, how_many
 
 if TYPE_CHECKING:
     from shellform.study.studies import StudyProgress
@@ -61,7 +61,8 @@ def study(
         )
     for name in () if quiet else found.empty:
         print(
-            f"shellform: note: no design has a value for the column {name!r}: is its path in summary.json?",
+            f"shellform: note: no design has a value for the column {name!r}: is its path in summary.json, "
+            "down to one number? Times stand in seconds.csv.",
             file=sys.stderr,
         )
     if as_json:
@@ -77,5 +78,5 @@ def study(
     elif not quiet:
         failed = f", {found.failed} of them without a result (see status and reason)" if found.failed else ""
         print(
-            f"{found.designs} designs, {found.found} found from before{failed}: {found.table}, {found.page}"
+            f"{how_many(found.designs, 'design', 'designs')}, {found.found} found from before{failed}: {found.table}, {found.page}"
         )

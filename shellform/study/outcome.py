@@ -2,12 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator
 
 Value = bool | int | float | str
+
+
+def _single(given: object) -> object:
+    """What is given for a value. Raises ValueError where it is none, or a number that isn't finite."""
+    if not isinstance(given, Value):
+        raise ValueError(
+            f"each is one number, text, true or false, and {given} is none; list designs under [[designs]]"
+        )
+    if isinstance(given, float) and not math.isfinite(given):
+        raise ValueError(f"a number is finite, and {given} isn't")
+    return given
+
+
+Single = Annotated[Value, BeforeValidator(_single)]
+"""A value in a file, whose refusal says one thing and not one for each type."""
 
 
 class Status(StrEnum):

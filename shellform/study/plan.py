@@ -38,7 +38,7 @@ from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError
 from shellform.study.expressions import evaluate
 from shellform.study.files_below import inside, matching
-from shellform.study.outcome import OWN_COLUMNS, Value
+from shellform.study.outcome import OWN_COLUMNS, Single, Value
 
 _MOST = 1_000_000  # designs
 _LONGEST = 31e6  # s, a year
@@ -61,7 +61,7 @@ class _Entry(BaseModel):
 class VaryEntry(_Entry):
     """How one entry of the case varies: a list, a range, or files."""
 
-    values: list[Value] | None = Field(None, min_length=1, description="the values themselves")
+    values: list[Single] | None = Field(None, min_length=1, description="the values themselves")
     low: float | None = Field(None, description="of a range")
     high: float | None = Field(None, description="of a range")
     count: int | None = Field(None, ge=1, le=_MOST, description="of values that a grid takes from a range")

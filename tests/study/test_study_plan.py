@@ -149,6 +149,8 @@ def test_designs_can_be_listed_and_surfaces_taken_from_a_folder(tmp_path):
         ("[vary]\nnet.spacin = [0.1]", "Did you mean 'net.spacing'"),
         ("[vary]\nnet.spacing = { low = 0.1 }", "both low and high"),
         ("[vary]\nnet.spacing = { low = 0.2, high = 0.1, count = 3 }", "low must be below high"),
+        ("[vary]\nnet.offset = [[0.5, 0.5], [0.0, 0.0]]", "list designs under [[designs]]"),
+        ("[vary]\nnet.spacing = [0.1, inf]", "a number is finite"),
         ("[vary]\nnet.spacing = { low = 0, high = 0.1, count = 3, scale = 'log' }", "above zero"),
         ("[vary]\nnet.spacing = { low = 0.1, high = 0.2 }", "needs the range's count"),
         ("[vary]\nnet.spacing = { low = 0.1, high = 0.2, values = [1] }", "give one of"),
