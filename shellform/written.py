@@ -31,6 +31,8 @@ _REMEDIES = {
     errno.ENOSPC: "Free some space, then run the same command again: what was finished is kept.",
     errno.EDQUOT: "Free some space, then run the same command again: what was finished is kept.",
     errno.EFBIG: "Choose a file system that takes larger files, or raise the limit on their size.",
+    errno.EEXIST: "A file stands there: name a folder.",
+    errno.ENOTDIR: "A part of that path is a file: choose another folder.",
     errno.EACCES: "Choose a folder that you may write to.",
     errno.EPERM: "Choose a folder that you may write to.",
     errno.EROFS: "Choose a folder that you may write to.",

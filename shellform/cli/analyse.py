@@ -95,7 +95,7 @@ def analyse(
 def _lead(text: str) -> tuple[int, int, float]:
     try:
         node, axis, metres = text.split(":")
-        return int(node), "xyz".index(axis), float(metres)
+        return int(node), ["x", "y", "z"].index(axis), float(metres)
     except ValueError as error:
         raise InputError(
             "must read NODE:AXIS:METRES", where="--lead", value=text, remedy="For example 17:z:-0.05."

@@ -131,7 +131,7 @@ def _material(given: _Material) -> Material:
         raise InputError(
             "needs either shear or poisson",
             where="material",
-            remedy="Keep one: each follows from young and the other.",
+            remedy="Give one of the two: each follows from young and the other.",
         )
     require_number(
         given.lasting,

@@ -210,7 +210,7 @@ def replay(
         )
     )
     write_text(file, text)
-    gone = f"{100.0 * played.removed:.0f} % of the misfit is gone after {how_many(len(played.adjustments), 'round', 'rounds')}"
+    gone = f"{100.0 * played.removed:.0f} % of the misfit, of the distances' squares, is gone after {how_many(len(played.adjustments), 'round', 'rounds')}"
     return SiteResult([*text.splitlines(), gone], [file])
 
 

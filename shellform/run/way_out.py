@@ -140,7 +140,7 @@ def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:
         label="change, m",
     )
     return (
-        f"The nearest surface with which this goes on is {folder / SURFACE}{cad} (in metres"
+        f"The nearest surface with which this goes on is {folder / SURFACE}{cad} ({'the first ' if cad else ''}in metres"
         f"{f', with {options}' if options else ''}): creases rounded to "
         f"{radius:.3g} m, {off}{_another(found)} (change.png)"
     )

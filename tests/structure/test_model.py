@@ -322,11 +322,12 @@ def test_the_command_prints_notes_and_refuses_with_status_2(tmp_path):
     )
     assert good.returncode == 0, good.stderr
     assert json.loads(good.stdout)["converged"]
-    bad = subprocess.run(
-        [*call, "--load", "push", "--lead", "four"], capture_output=True, text=True, check=False
-    )
-    assert bad.returncode == 2
-    assert "NODE:AXIS:METRES" in bad.stderr
+    for lead in ("four", "4::0.001", "4:xy:0.001", "4:w:0.001"):
+        bad = subprocess.run(
+            [*call, "--load", "push", "--lead", lead], capture_output=True, text=True, check=False
+        )
+        assert bad.returncode == 2
+        assert "NODE:AXIS:METRES" in bad.stderr
 
 
 def block(side):

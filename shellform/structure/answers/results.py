@@ -174,7 +174,7 @@ def _section(table: object, where: str) -> Section:
         raise InputError(
             "needs either shear or poisson",
             where=where,
-            remedy="Keep one: each follows from young and the other.",
+            remedy="Give one of the two: each follows from young and the other.",
         )
     for name, value in table.items():
         possible = SECTION_SIZE if name in sizes else _POSSIBLE.get(name)

@@ -300,7 +300,7 @@ class Walk:
             state=here.state,
             residual=here.equilibrium.residual,
             iterations=self.spent,
-            remedy="Take a smaller first step, lead another displacement, or allow more points.",
+            remedy="Take a smaller first step, or lead another displacement.",
         )
 
     def _settled(self, here: OnPath, state: State, factor: float, iterations: int) -> OnPath:
