@@ -43,6 +43,7 @@ from shellform.structure.solve.outlook import WINDOW, View, turns_between
 from shellform.structure.solve.residual import ResidualNorm
 from shellform.structure.solve.walk import Doubted, Lead, Missed, OnPath, PathPoint, Walk
 
+_TOO_LONG = "Lead another displacement, go less far, or in Python allow more points."
 FIRST = 0.1  # of the goal, the first step's change of the factor
 MOST = 500  # points
 _EASY = 4  # iterations that leave the step as it is
@@ -128,7 +129,7 @@ def follow(
             left = lead.displacement - walk.displacement(there.state, lead)
             size = float(np.sign(left)) * min(abs(size), abs(left))
         here, view, began = there, seen, True
-    raise walk.gave_up(here, f"The path did not come to its end within {most} points")
+    raise walk.gave_up(here, f"The path did not come to its end within {most} points", _TOO_LONG)
 
 
 def _with_digits(assembly: Assembly, start: State, load: Reals, tolerance: float) -> tuple[Assembly, State]:

@@ -293,14 +293,19 @@ class Walk:
         kind = "limit point" if before.rate * near.rate < 0.0 else "bifurcation"
         return replace(near.point(), event=kind), before
 
-    def gave_up(self, here: OnPath, what: str) -> NotConverged:
+    def gave_up(
+        self,
+        here: OnPath,
+        what: str,
+        remedy: str = "Take a smaller first step, or lead another displacement.",
+    ) -> NotConverged:
         """The refusal to go on from a point, saying `what` failed."""
         return NotConverged(
             f"{what} (load factor {here.factor:.6g})",
             state=here.state,
             residual=here.equilibrium.residual,
             iterations=self.spent,
-            remedy="Take a smaller first step, or lead another displacement.",
+            remedy=remedy,
         )
 
     def _settled(self, here: OnPath, state: State, factor: float, iterations: int) -> OnPath:
