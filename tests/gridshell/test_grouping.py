@@ -53,7 +53,11 @@ def test_a_round_net_s_cables_come_in_groups_of_four_that_lie_on_each_other(dome
 def placed(middles, spacing=1.0):
     """A shell with a cable about each of the places (x, y) and crossings in a box 6 by 10 about (20, -3)."""
     ends = np.arange(2 * len(middles)).reshape(-1, 2)
-    plan = [(s * x, s * y) for x, y in middles for s in (0.9, 1.1)]
+    plan = [
+        (s * x, s * y) if (x, y) != (0, 0) else (s - 1.0, 3.0 * (s - 1.0))
+        for x, y in middles
+        for s in (0.9, 1.1)
+    ]
     return lying(plan, ends, spacing)
 
 
@@ -73,7 +77,7 @@ def lying(plan, ends, spacing=1.0):
     [
         ([(1, 2), (2, 1), (-1, 2), (-2, 1), (0, 3)], [0, 1, 0, 1, 2]),  # mirrored in x alone
         ([(1, 2), (2, 1), (1, -2), (2, -1), (3, 0)], [0, 1, 0, 1, 2]),  # in y alone
-        ([(1, 2), (2, 1), (-2, -1), (-1, -2)], [0, 1, 1, 0]),  # turned by half a turn alone
+        ([(1, 2), (2, 1), (-2, -1), (-1, -2), (0, 0)], [0, 1, 1, 0, 2]),  # turned by half a turn alone
         ([(1, 2), (-1, 2), (1, -2), (-1, -2), (0, 3), (0, -3)], [0, 0, 0, 0, 1, 1]),
     ],
 )

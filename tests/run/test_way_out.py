@@ -263,7 +263,7 @@ def test_a_rounded_surface_that_falls_on_edge_beams_is_offered_on_walls(tmp_path
         refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", lambda text: None
     ).offered
     assert tried == ["auto", "wall"]
-    assert "in metres, with --edges wall)" in told.remedy
+    assert "(the first in metres, with --edges wall)" in told.remedy
     assert named(told).is_file()
     before = named(told).stat().st_mtime_ns
     again = first_refusal.with_ways_out(refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", print)
@@ -294,7 +294,7 @@ def test_a_thin_layer_that_stood_on_a_rounded_surface_is_the_way_out_where_nothi
         return
     assert found.way_out.design is thin
     assert (found.way_out.wish.edges, found.way_out.wish.thickness) == ("wall", 0.009)
-    assert "in metres, with --edges wall --thickness 0.009)" in found.offered.remedy
+    assert "(the first in metres, with --edges wall --thickness 0.009)" in found.offered.remedy
     assert named(found.offered).is_file()
     assert ("wall", False) in tried[:2]
 
@@ -343,7 +343,7 @@ def test_finer_spacings_are_tried_on_the_rounded_surface_that_came_nearest_where
         assert finely[0][2] == brief[3 if bore else -1][1], "the very same surface"
         assert found.way_out.design is STANDS
         assert found.way_out.wish == DesignWish(edges=tried[0][0])
-        assert ("in metres, with --edges wall)" in found.offered.remedy) == (tried[0][0] == "wall")
+        assert ("(the first in metres, with --edges wall)" in found.offered.remedy) == (tried[0][0] == "wall")
     else:
         assert found.way_out is None
     again = first_refusal.with_ways_out(
