@@ -303,18 +303,23 @@ def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) ->
             remedy="Close them (surface.fill), or write a mesh.",
         )
     with session(), errors(file, "gmsh can't fit a surface", "Write a mesh."):
-        off = _fit(surface, _AT_FIRST)
-    if off <= _HOPELESS * most:
-        with session(), errors(file, "gmsh can't fit a surface", "Write a mesh."):
-            off = _fit(surface, _FITTED)
-            if off <= most:
-                if kind == "iges":
-                    gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, *3 * (_IGES_UNITS,))
-                    gmsh.model.occ.synchronize()
-                with silence():
-                    gmsh.write(str(file))
-                return off
-    raise NotConverged(f"The fitted surface is {off:.2g} m off", residual=off, remedy="Write a mesh instead.")
+        _refuse_off(_fit(surface, _AT_FIRST), _HOPELESS * most)
+    with session(), errors(file, "gmsh can't fit a surface", "Write a mesh."):
+        off = _fit(surface, _FITTED)
+        _refuse_off(off, most)
+        if kind == "iges":
+            gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, *3 * (_IGES_UNITS,))
+            gmsh.model.occ.synchronize()
+        with silence():
+            gmsh.write(str(file))
+    return off
+
+
+def _refuse_off(off: float, most: float) -> None:
+    if off > most:
+        raise NotConverged(
+            f"The fitted surface is {off:.2g} m off", residual=off, remedy="Write a mesh instead."
+        )
 
 
 def _fit(surface: Surface, count: int) -> float:
