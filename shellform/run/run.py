@@ -161,8 +161,6 @@ def _run_alone(workspace: Workspace, fresh: bool, parts: Parts, began: float) ->
     if workspace.sketch:
         refuse_over_full(folder, fresh=fresh)
     summary = read_summary(folder) if done.keys else Summary()
-    if "report" not in done.keys or any(stage not in SHOWING for stage in summary.failed):
-        (folder / FILE).unlink(missing_ok=True)  # which tells of an end that may be none now
     summary = replace(summary, shellform=shellform.__version__, failed={}, sketch=workspace.sketch)
     for part in ("designs", "states", "figures", "schedules"):
         make_folder(folder / part)
