@@ -18,7 +18,7 @@ from shellform.net.net import Net
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.pull import FROM_COMPASS, FROM_FLAT, Pulling
 from shellform.net.quality import refuse_nearness
-from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
+from shellform.net.refusal import Attempt, Beside, Change, NoNet, Reason, Stalled
 from shellform.surface.shape.target import Surface, largest_curvature
 
 TOLERANCE = math.radians(10.0)  # of the angle asked for
@@ -112,12 +112,10 @@ def climbed_net(
         try:
             if failed is not None and not attempts:
                 raise failed
-            net = net_at(surface, _changed(settings, rung), angle=turned, offset=shifted, progress=watch)
+            net = _at(surface, settings, rung, turned, shifted, watch)
             if not near:
                 refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
-            if error.reason is Reason.BESIDE and not attempts:
-                raise
             taken = error.iterations if isinstance(error, Stalled) else error.factorisations
             attempts.append(Attempt(rung.change, turned, shifted, error.reason, taken))
             progress(attempts[-1].sentence())
@@ -134,6 +132,24 @@ def climbed_net(
         return dataclasses.replace(net, notes=notes, attempts=(*attempts, given)), given
     assert first is not None
     raise _refused(first, attempts, surface, spent) from first
+
+
+def _at(
+    surface: Surface,
+    settings: NetSettings,
+    rung: Rung,
+    angle: float,
+    offset: tuple[float, float],
+    watch: Pulling | None,
+) -> Net:
+    """The net of a rung. Raises as `net_at`, but NoNet where it is the rung's change that puts the origin off
+    the surface."""
+    try:
+        return net_at(surface, _changed(settings, rung), angle=angle, offset=offset, progress=watch)
+    except Beside as error:
+        if rung.change is Change.NOTHING:
+            raise
+        raise NoNet(Reason.BESIDE, error.what) from error
 
 
 def _vain(rung: Rung, settings: NetSettings, first: NoNet | Stalled | None) -> bool:

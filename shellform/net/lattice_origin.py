@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Reals, Record, reals
 from shellform.errors import InputError
 from shellform.net.compass import Finder, Guide, raised
-from shellform.net.refusal import NoNet, Reason
+from shellform.net.refusal import Beside, Reason
 from shellform.surface.shape.target import Surface
 from shellform.surface.shape.triangles import triangle_areas
 
@@ -65,8 +65,7 @@ def _on_surface(surface: Surface, finder: Finder, plan: Reals, where: str) -> tu
     point = _above(surface, finder, plan)
     foot = finder.foot(point[None])
     if finder.past_outline(foot)[0] > 0.0:
-        raise NoNet(
-            Reason.BESIDE,
+        raise Beside(
             Reason.BESIDE.value,
             where=where,
             value=plan.round(4).tolist(),

@@ -39,6 +39,10 @@ class NoNet(InputError):
         super().__init__(what, where=where, value=value, remedy=remedy)
 
 
+class Beside(InputError):
+    """An origin of a net that lies off the surface: nothing is wrong with that."""
+
+
 class Stalled(NotConverged):
     """A pull that found no equilibrium: `residual` is what it came to."""
 
