@@ -150,8 +150,7 @@ def net_of(
         offset=entry.offset,
         progress=progress,
     )
-    outline = None if entry.outline is None else np.array(entry.outline)
-    return stand(net, surface, edges_of(case), outline=outline), angle, offset
+    return stand(net, surface, edges_of(case)), angle, offset
 
 
 def edges_of(case: Case) -> Edges:

@@ -98,13 +98,11 @@ class Edges:
             require_known(kind, ("auto", *KINDS), where=f"edges.{name}", what="is no kind of edge")
 
 
-def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals | None = None) -> Net:
+def stand(net: Net, surface: Surface, edges: Edges = Edges()) -> Net:
     """The net with its edges as they are: rods' ends held where the edge is, edge beams along the others.
-
-    `outline` (k, 2), m: the plan curve at which the net was cut off, if it was. Raises InputError where
-    nothing is left that holds the shell.
+    Raises InputError where nothing is left that holds the shell.
     """
-    ends, rims = ends_of(net, surface, outline)
+    ends, rims = ends_of(net, surface)
     ground = ground_under(surface, edges.ground)
     _refuse_missed(edges, rims)
     for rim in rims:

@@ -53,7 +53,7 @@ class End(Record):
     middle: Reals
 
 
-def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End], list[Rim]]:
+def ends_of(net: Net, surface: Surface) -> tuple[list[End], list[Rim]]:
     """The rods' ends on the curves that they lie on: the surface's edges, then the curve along which a level
     or an outline cut the rods off."""
     nodes, place = net.rod_ends, net.target.positions
@@ -72,8 +72,8 @@ def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End
         inner = middle[cut, :2] - middle[cut, :2].mean(axis=0)
         key = (
             np.arctan2(inner[:, 1], inner[:, 0])
-            if outline is None
-            else nearest(middle[cut, :2], closed(outline))[1]
+            if net.limits.plan is None
+            else nearest(middle[cut, :2], closed(net.limits.plan))[1]
         )
         apart = _APART * net.grid.scale
         for chain in _chains(cut[np.argsort(key, kind="stable")], middle, apart):

@@ -119,18 +119,21 @@ def test_a_net_lies_at_its_angle_in_radians_with_the_joint_s_gap(monkeypatch, an
     asked = []
 
     def oriented(surface, settings, *, angle, offset, progress):
-        asked.append((angle, offset, settings.gap, settings.spacing, settings.elements))
+        asked.append((angle, offset, settings.gap, settings.spacing, settings.elements, settings.outline))
         return "net", 0.4, (0.25, 0.0)
 
     monkeypatch.setattr(module, "oriented_net", oriented)
-    monkeypatch.setattr(module, "stand", lambda net, surface, edges, *, outline: (net, outline))
+    monkeypatch.setattr(module, "stand", lambda net, surface, edges: (net, edges))
     outline = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]
     own = case({"angle": angle, "offset": (0.5, 0.1), "elements": 3, "outline": outline})
-    (net, kept), *placed = net_of(own, plate())
-    assert (net, kept.tolist(), placed) == ("net", [list(each) for each in outline], [0.4, (0.25, 0.0)])
-    assert asked == [(turned if angle == "auto" else pytest.approx(turned), (0.5, 0.1), 0.02, 0.5, 3)]
+    (net, edges), *placed = net_of(own, plate())
+    assert (net, edges.outer, placed) == ("net", "auto", [0.4, (0.25, 0.0)])
+    assert asked == [
+        (turned if angle == "auto" else pytest.approx(turned), (0.5, 0.1), 0.02, 0.5, 3, outline)
+    ]
     plain = case()
-    assert net_of(plain, plate())[0] == ("net", None)
+    assert net_of(plain, plate())[0][0] == "net"
+    assert asked[-1][-1] is None
     with pytest.raises(InputError, match="rounding hides the load"):
         net_of(plain, plate((20_000.0, 0.0, 0.0)))
 

@@ -262,7 +262,7 @@ def test_a_net_cut_off_by_an_outline_has_its_edge_along_it():
     surface = barrel(length=1.2)
     outline = [[-0.35, -9.0], [0.35, -9.0], [0.35, 9.0], [-0.35, 9.0]]
     net = pulled(surface, outline=outline)
-    found = stand(net, surface, outline=np.array(outline))
+    found = stand(net, surface)
     beams = [line for line in found.edges if len(line.clamps) > 5]
     assert len(beams) == 2
     for line in beams:
@@ -278,7 +278,7 @@ def test_a_net_cut_off_by_an_outline_has_its_edge_along_it():
 def test_a_net_cut_off_by_an_outline_within_its_surface_has_an_edge_all_round():
     surface, angles = barrel(length=1.2), np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
     outline = 0.25 * np.column_stack([np.cos(angles), np.sin(angles)])
-    found = stand(pulled(surface, outline=outline), surface, Edges(outer="wall"), outline=outline)
+    found = stand(pulled(surface, outline=outline), surface, Edges(outer="wall"))
     (cut,) = [each for each in found.stretches if np.ptp(each.points[:, 0]) < 0.6]
     assert cut.whole
     assert cut.length == pytest.approx(np.linalg.norm(np.diff(cut.points, axis=0), axis=1).sum())
@@ -354,8 +354,7 @@ def test_what_lies_beyond_a_level_or_an_outline_is_no_edge_and_loads_nothing(
 ):
     """A barrel of 0.8 m, of which the middle half is built, or what lies above a level."""
     surface, whole = vault_of_two_arches
-    outline = None if "outline" not in cut else np.array(cut["outline"])
-    net = stand(pulled(surface, **cut), surface, Edges(ground=cut.get("ground")), outline=outline)
+    net = stand(pulled(surface, **cut), surface, Edges(ground=cut.get("ground")))
     save_net(tmp_path / "net.npz", net)
     for each in (net, load_net(tmp_path / "net.npz")):
         load = sf.loads.concrete(each, surface, thickness=0.003, density=2400.0)

@@ -8,6 +8,7 @@ import pytest
 from shellform.net import edges as module
 from shellform.net.edges import Edges, Place
 from shellform.net.ground import Ground, ground_under
+from shellform.net.limits import NO_LIMITS
 from shellform.net.polylines import closed, nearest
 from shellform.net.rims import End, Rim, _chains, _reached, edges_of, ends_of, rim_of
 from shellform.structure.elements.rotation import matrices
@@ -266,8 +267,9 @@ def test_rods_ends_lie_on_the_nearest_edge_half_a_gap_below_or_above_it_unless_t
             quaternions=np.tile([1.0, 0, 0, 0], (8, 1)),
         ),
         grid=SimpleNamespace(layer=layer[::-1], scale=1.0),
+        limits=NO_LIMITS,
     )
-    ends, rims = ends_of(net, surface, None)
+    ends, rims = ends_of(net, surface)
     assert [(each.opening, each.cut) for each in rims] == [(False, False), (True, False), (False, True)]
     assert [each.node for each in ends] == list(range(8))[::-1]
     np.testing.assert_allclose([each.middle for each in ends], middles, atol=1e-12)
@@ -366,8 +368,9 @@ def test_ends_that_were_cut_off_are_chained_up_to_two_and_a_half_spacings_and_re
         rod_ends=np.arange(6),
         target=SimpleNamespace(positions=middles, quaternions=np.tile([1.0, 0, 0, 0], (6, 1))),
         grid=SimpleNamespace(layer=np.zeros(6), scale=2.0),
+        limits=NO_LIMITS,
     )
-    ends, rims = ends_of(net, surface, None)
+    ends, rims = ends_of(net, surface)
     assert ends[5].rim == 0, "less than half a spacing from the edge"
     assert ends[0].rim == ends[1].rim == ends[2].rim
     assert ends[3].rim == ends[4].rim != ends[0].rim
