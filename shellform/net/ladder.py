@@ -149,7 +149,7 @@ def _at(
     except Beside as error:
         if rung.change is Change.NOTHING:
             raise
-        raise NoNet(Reason.BESIDE, error.what) from error
+        raise NoNet(Reason.BESIDE, error.what, remedy=error.remedy) from error
 
 
 def _vain(rung: Rung, settings: NetSettings, first: NoNet | Stalled | None) -> bool:
