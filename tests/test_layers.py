@@ -22,7 +22,7 @@ FLOORS = {
         ["errors", "work_clock", "lazy", "processes"],
         ["compiled", "quantities"],
         ["arrays", "written"],
-        ["tables"],
+        ["tables", "plan_rectangle"],
         ["structure"],
         ["surface"],
         ["verification", "net", "networks"],

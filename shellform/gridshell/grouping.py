@@ -2,7 +2,8 @@
 fewest lengths to cut cables to.
 
 A symmetry is a mirror or a half turn of the plan about the middle of the joints under which every candidate
-cable lies on another one. Cables that symmetries join are a group, of which every member gets the same rest
+cable lies on another one; mirrors are sought along x and y and along the smallest rectangle round the
+joints. Cables that symmetries join are a group, of which every member gets the same rest
 length (`sf.polish` with `groups`).
 
 Turnbuckles take up what lengths differ within a group. With a range of adjustment w, cables can be cut to the
@@ -12,6 +13,8 @@ wherever the range is used up gives the fewest different lengths that there can 
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -20,6 +23,7 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Gridshell
+from shellform.plan_rectangle import axes_in_plan, turn_in_plan
 
 _SYMMETRIES = ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))  # signs of x and y in two mirrors and the half turn
 _TOLERANCE = 0.02  # of the spacing, within which the image of each cable's end has to lie on another's
@@ -31,13 +35,11 @@ def symmetric_groups(shell: Gridshell) -> Indices:
     joins any.
     """
     places, ends = _ends(shell)
-    plan = np.ptp(shell.net.crossings[:, :2], axis=0) / 2.0 + shell.net.crossings[:, :2].min(axis=0)
     tree, reach = cKDTree(places), _TOLERANCE * shell.net.spacing
     count, joined = len(ends), list[Indices]()
     number = {(a, b): k for k, (a, b) in enumerate(np.sort(ends, axis=1).tolist())}
-    for sign in _SYMMETRIES:
-        image = places.copy()
-        image[:, :2] = plan + np.array(sign) * (places[:, :2] - plan)
+    for turn, sign in product({0.0, turn_in_plan(shell.net.crossings)}, _SYMMETRIES):
+        image = _image(places, shell.net.crossings, axes_in_plan(turn), np.array(sign))
         away, there = tree.query(image)
         if (away > reach).any():
             continue
@@ -55,6 +57,16 @@ def symmetric_groups(shell: Gridshell) -> Indices:
     pairs = np.vstack(joined)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _image(places: Reals, joints: Reals, axes: Reals, sign: Reals) -> Reals:
+    """Where `places` (k, 3) come to by changing signs along `axes`, columns (2, 2), about the middle of the
+    `joints`."""
+    plan = joints[:, :2] @ axes
+    middle = np.ptp(plan, axis=0) / 2.0 + plan.min(axis=0)
+    image = places.copy()
+    image[:, :2] = (middle + sign * (places[:, :2] @ axes - middle)) @ axes.T
+    return image
 
 
 def _ends(shell: Gridshell) -> tuple[Reals, Indices]:

@@ -14,10 +14,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Final
 
-import numpy as np
-
 from shellform.errors import InputError, if_per_cents, require_known, require_number
 from shellform.gridshell.gridshell import Gridshell
+from shellform.plan_rectangle import longest_side
 from shellform.quantities import PLACE_DEVIATION
 
 SCALE_MODEL_BELOW: Final = 2.0  # m of span
@@ -191,5 +190,5 @@ def default_tolerances(shell: Gridshell) -> Tolerances:
 
 
 def span_of(shell: Gridshell) -> float:
-    """The longest side, m, of the box round the target, along the axes."""
-    return float(np.ptp(shell.target.positions, axis=0).max())
+    """The longest side, m, of the box round the target, however it is turned in plan."""
+    return longest_side(shell.target.positions)

@@ -44,6 +44,7 @@ from shellform.net.pull import (
 from shellform.net.quality import measure, nearness, refuse_distance, refuse_folds
 from shellform.net.refusal import NoNet, Reason
 from shellform.net.trim import FEWEST, Trimmed, Uncovered, bare_rods, trim
+from shellform.plan_rectangle import sides_in_plan
 from shellform.quantities import LENGTHS, MILLIMETRES, if_other_unit
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import dense_on_one
@@ -234,15 +235,15 @@ def _limits(settings: NetSettings) -> NetLimits:
 def _check(surface: Surface, settings: NetSettings) -> None:
     """Raises InputError for settings that can't work on this surface."""
     steps, gap = settings.spacings, settings.gap
-    extent = float(max(surface.size[:2]))
-    narrow = float(min(surface.size[:2]))
+    x, y = sides_in_plan(surface.vertices).tolist()
+    extent, narrow = max(x, y), min(x, y)
     for name, spacing in zip(("net.spacing", "net.spacing_v"), steps, strict=True):
         require_number(
             spacing, above=0.0, where=name, give=f"metres, such as {narrow / 10.0:.2g} on this surface"
         )
         if spacing > 0.5 * narrow:
             raise InputError(
-                f"is too large for a surface of {surface.size[0]:.3g} × {surface.size[1]:.3g} m in plan",
+                f"is too large for a surface of {x:.3g} × {y:.3g} m in plan",
                 where=name,
                 value=spacing,
                 remedy="Choose a smaller spacing, or check the surface's unit."

@@ -20,10 +20,10 @@ from shellform.arrays import Reals, Record, reals
 from shellform.surface.shape.target import Surface
 from shellform.surface.shape.triangles import directed_edges, triangle_areas
 
-LOW = 0.02  # of the larger extent in plan: an edge no higher over the ground stands on it
+LOW = 0.02  # of the longer side in plan: an edge no higher over the ground stands on it
 _STEEPEST = 0.5  # fall over length of ground: steeper ones are walls
 _MORE = 1.2  # times the edge that stands on level ground
-_AROUND = 0.1  # of the larger extent in plan: so far from what bears it lies the middle inwards
+_AROUND = 0.1  # of the longer side in plan: so far from what bears it lies the middle inwards
 _RISING = 0.1  # rise over length, from the edge inwards, of a shell that comes down to it
 _MOSTLY = 0.8  # of what stands on the slope alone
 _DIRECTIONS = 36  # in which bearing is asked for
@@ -62,7 +62,7 @@ class Ground(Record):
 def ground_under(surface: Surface, level: float | None = None) -> Ground:
     """The ground under a surface; at a `level`, m, that is given, level."""
     outer = surface.vertices[surface.boundary[0]]
-    low = LOW * float(surface.size[:2].max())
+    low = LOW * surface.longer_side
     flat = Ground(float(outer[:, 2].min()) if level is None else level, np.zeros(2), low)
     if level is not None:
         return flat
@@ -75,7 +75,7 @@ def ground_under(surface: Surface, level: float | None = None) -> Ground:
     added = held & ~level_held
     if edge.length[held].sum() < _MORE * edge.length[level_held].sum():
         return flat
-    if not _bears(edge.middle[held][:, :2] - middle, _AROUND * float(surface.size[:2].max())):
+    if not _bears(edge.middle[held][:, :2] - middle, _AROUND * surface.longer_side):
         return flat
     rising = edge.rises(sloping) > _RISING
     if edge.length[added & rising].sum() < _MOSTLY * edge.length[added].sum():

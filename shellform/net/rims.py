@@ -100,7 +100,7 @@ def edges_of(surface: Surface) -> list[Rim]:
     """The surface's edges, the outer one first. Where its mesh is coarse they have points between vertices,
     which lie no farther apart than what counts as low over the ground is high: of a long side of a triangle
     that comes down to a foot, half would stand on the ground."""
-    step = LOW * float(surface.size[:2].max())
+    step = LOW * surface.longer_side
     return [
         rim_of(_divided(surface.vertices[loop], step), number > 0)
         for number, loop in enumerate(surface.boundary)

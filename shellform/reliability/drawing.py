@@ -196,17 +196,10 @@ def built_load(load: Reals, errors: Errors) -> Reals:
     return np.asarray(load * errors.load[:, None])
 
 
-def halves(places: Reals) -> Reals:
-    """Shares (n, 2) of a load that make one half of the plan heavier by as much as the other is lighter, in
-    two directions at right angles: a plane each, whose mean size over the nodes at `places` (n, 3) is 1."""
-    plan = places[:, :2] - places[:, :2].mean(axis=0)
-    return np.asarray(plan / np.maximum(np.abs(plan).mean(axis=0), 1e-300))
-
-
 def _load_factors(members: Members, t: Tolerances, z: Mapping[str, Reals]) -> Reals:
     """Factors (n,): each crossing's own, the whole, and one half against the other."""
     each = 1.0 + t.load_each * z["load_each"][members.zone]
-    uneven = 1.0 + t.load_uneven * halves(members.places) @ z["load_uneven"]
+    uneven = 1.0 + t.load_uneven * members.halves @ z["load_uneven"]
     return np.asarray(each * uneven * (1.0 + t.load_all * float(z["load_all"][0])))
 
 

@@ -17,9 +17,11 @@ from shellform.arrays import Indices, Reals, Record
 from shellform.gridshell.gridshell import Gridshell
 from shellform.gridshell.layers import LOCK
 from shellform.net.grid import ROD
+from shellform.plan_rectangle import along_sides, longest_side
 from shellform.structure.elements.beam import Beams
 from shellform.structure.model import Model
 
+_ROW = 1e-9  # of the other: half a width less than that is that of nodes in a row, which have no other half
 _STRAIGHT_ON = 0.99  # cosine of the angle between two elements of one rod
 
 
@@ -82,8 +84,18 @@ class Members(Record):
 
     @cached_property
     def span(self) -> float:
-        """The longest side, m, of the box round the target."""
-        return float(np.ptp(self.places, axis=0).max())
+        """The longest side, m, of the box round the target, however it is turned in plan."""
+        return longest_side(self.places)
+
+    @cached_property
+    def halves(self) -> Reals:
+        """Shares (n, 2) of a load that make one half of the plan heavier by as much as the other is lighter,
+        in two directions at right angles, those of the smallest rectangle round it: a plane each, whose mean
+        size over the nodes is 1."""
+        plan = along_sides(self.places)
+        plan = plan - plan.mean(axis=0)
+        size = np.abs(plan).mean(axis=0)
+        return np.asarray(plan / np.where(size > _ROW * size.max(), size, np.inf))
 
     @cached_property
     def rod_elements(self) -> RodElements:

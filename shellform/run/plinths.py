@@ -48,8 +48,8 @@ def plinths_for(surface: Surface) -> Plinths | None:
     if radius > _SHARP * first_spacing(surface)[0] or ground_under(surface).slopes:
         return None
     lowest = float(surface.vertices[:, 2].min())
-    step = 10.0 ** math.floor(math.log10(LOW * float(surface.size[:2].max())) - 1)  # two digits
-    above = step * math.floor((lowest + LOW * float(surface.size[:2].max())) / step)
+    step = 10.0 ** math.floor(math.log10(LOW * surface.longer_side) - 1)  # two digits
+    above = step * math.floor((lowest + LOW * surface.longer_side) / step)
     try:
         rest = cut_off(surface, round(above, 6))
     except InputError:

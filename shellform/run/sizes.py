@@ -25,6 +25,7 @@ from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.layers import TwoLayers, layers_of, locked_bending
 from shellform.gridshell.tolerances import tolerances_of_size
 from shellform.net.net import Net
+from shellform.plan_rectangle import longest_side
 from shellform.structure.elements.sections import Section, mass_per_length
 from shellform.surface.shape.bends import curvature_mean_square, curvature_shown, curvature_usual
 from shellform.surface.shape.target import Surface, width
@@ -188,7 +189,7 @@ def practical(spacing: float) -> float:
 
 def usual_thickness(surface: Surface) -> float:
     """Of the concrete with which `new` begins, m: 50 mm, less on models of under 4 m."""
-    return max(min(THICKNESS, whole_mm(float(surface.size[:2].max()) / _SLENDER)), 0.002)
+    return max(min(THICKNESS, whole_mm(surface.longer_side / _SLENDER)), 0.002)
 
 
 def may_come_off(surface: Surface, thickness: float) -> float:
@@ -237,7 +238,7 @@ def thicker(rope: Rope, times: float = 1.0) -> Rope | None:
 def rest_ratio_for(surface: Surface, spacing: float) -> float:
     """Of the cables, rest length over length: their prestrain takes up what all but one in twenty are off in
     length, within bounds."""
-    span, length = float(surface.size.max()), math.sqrt(2.0) * spacing
+    span, length = longest_side(surface.vertices), math.sqrt(2.0) * spacing
     off = tolerances_of_size(span, longest_rod=span, longest_cable=length).cable_length
     return round(1.0 - min(max(2.0 * off / length, LEAST_PRESTRAIN), _MOST_PRESTRAIN), 4)
 

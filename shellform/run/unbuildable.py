@@ -167,7 +167,7 @@ class Obstacle(Record):
 
 def refuse_size(surface: Surface) -> None:
     """Raises InputError for a surface smaller or larger than any shell."""
-    side = float(surface.size[:2].max())
+    side = surface.longer_side
     if SMALLEST <= side <= LARGEST:
         return
     x, y, z = surface.size
@@ -320,7 +320,7 @@ def _rounding(surface: Surface, failure: Obstacle, wish: DesignWish) -> float:
     vault."""
     needed = NEEDED * pressure(failure.thickness, CONCRETE)
     if flat_between_creases(surface):
-        return _ARCHED * float(surface.size[:2].max())
+        return _ARCHED * surface.longer_side
     wanted = radius_for(surface, failure.spacing, needed, wish)
     return min(wanted, _OPEN / max(curvature_usual(surface), 1e-12))
 
@@ -328,7 +328,7 @@ def _rounding(surface: Surface, failure: Obstacle, wish: DesignWish) -> float:
 def flat_between_creases(surface: Surface) -> bool:
     """Whether three quarters of the surface are hardly curved, as roofs of flat pieces are: rounded creases
     alone leave it flat, and a flat grid bears nothing."""
-    return float(surface.size[:2].max()) * curvature_usual(surface) < 1.0
+    return surface.longer_side * curvature_usual(surface) < 1.0
 
 
 def _crease(

@@ -11,6 +11,7 @@ from scipy.spatial import Delaunay
 import shellform as sf
 from shellform.errors import InputError
 from shellform.gridshell.grouping import averaged, cut_lengths, symmetric_groups
+from shellform.plan_rectangle import axes_in_plan
 
 
 def cap(*, offset=(0.0, 0.0), radius=1.0, rise=0.3, rings=16):
@@ -65,8 +66,8 @@ def lying(plan, ends, spacing=1.0):
     """A shell with cables between `ends` among the places (x, y), which are no crossings; these lie in a box
     6 by 10 about (20, -3)."""
     places = np.array([[20.0 + x, -3.0 + y, 5.0 + x**2 + 2.0 * y**2] for x, y in plan])
-    crossings = np.array([[17.0, -3.0, 0.0], [23.0, 2.0, 0.0], [18.0, -8.0, 0.0]])
-    nodes = len(places) + np.arange(3)[:, None] + [0, 0]
+    crossings = np.array([[17.0, -8.0, 0.0], [23.0, 2.0, 0.0], [17.0, 2.0, 0.0], [23.0, -8.0, 0.0]])
+    nodes = len(places) + np.arange(4)[:, None] + [0, 0]
     net = SimpleNamespace(crossings=crossings, spacing=spacing, grid=SimpleNamespace(crossing_nodes=nodes))
     target = SimpleNamespace(positions=np.vstack([places, crossings]))
     return SimpleNamespace(target=target, cable_ends=ends, net=net)
@@ -95,6 +96,14 @@ def test_ends_lie_on_each_other_within_a_fiftieth_of_the_spacing(off, alike):
     else:
         with pytest.raises(InputError, match="within 40 mm"):
             symmetric_groups(shell)
+
+
+@pytest.mark.parametrize("turn", [0.3, 1.2])
+def test_a_symmetric_net_has_the_same_groups_when_it_is_turned(turn):
+    shell = placed([(1, 2), (-1, 2), (1, -2), (-1, -2), (0, 3), (0, -3)])
+    for points in (shell.net.crossings, shell.target.positions):
+        points[:, :2] = points[:, :2] @ axes_in_plan(turn).T
+    assert symmetric_groups(shell).tolist() == [0, 0, 0, 0, 1, 1]
 
 
 def test_the_diagonals_of_a_cell_are_apart_though_either_s_middle_lies_nearer_to_the_other_s_image():

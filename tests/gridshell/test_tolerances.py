@@ -15,6 +15,7 @@ from shellform.gridshell.tolerances import (
     span_of,
     tolerances_of_size,
 )
+from shellform.plan_rectangle import axes_in_plan
 
 
 def test_every_cause_has_a_source_and_a_default_above_zero_but_for_doubts_about_means(shell):
@@ -117,8 +118,9 @@ def test_a_size_without_extent_is_refused():
 
 
 def test_a_shell_s_own_span_longest_rod_and_longest_cable_tell_its_tolerances():
-    """The longer side of the box, wherever it stands; without cables their length is nothing."""
-    places = np.array([[30.0, 5.0, 1.0], [36.0, 9.0, 4.0], [31.0, 23.0, -2.0]])
+    """The longer side of the box, wherever it stands and however it is turned; without cables their length is
+    nothing."""
+    places = np.array([[30.0, 5.0, 1.0], [36.0, 5.0, 4.0], [36.0, 23.0, -2.0], [30.0, 23.0, -2.0]])
     rods = [SimpleNamespace(length=length) for length in (12.0, 25.0, 7.0)]
     shell = SimpleNamespace(
         target=SimpleNamespace(positions=places),
@@ -126,6 +128,8 @@ def test_a_shell_s_own_span_longest_rod_and_longest_cable_tell_its_tolerances():
         cable_lengths=np.array([1.0, 3.5, 2.0]),
     )
     assert span_of(shell) == 18.0
+    slanting = np.column_stack([places[:, :2] @ axes_in_plan(0.7).T, places[:, 2]])
+    assert span_of(SimpleNamespace(target=SimpleNamespace(positions=slanting))) == pytest.approx(18.0)
     found = default_tolerances(shell)
     assert found == tolerances_of_size(18.0, longest_rod=25.0, longest_cable=3.5)
     assert found.cable_length == pytest.approx(2.7e-3)

@@ -53,7 +53,7 @@ def test_an_edge_stands_on_the_ground_up_to_a_fiftieth_of_the_larger_extent_abov
     assert (given.level, given.low, given.slopes) == pytest.approx((-1.0, 0.6, False))
 
 
-UNDIVIDED = np.array([1000.0, 1000.0, 1.0])  # of a surface so large that its edges are short
+UNDIVIDED = 1000.0  # of a surface so large that its edges are short
 
 
 def loop(levels, *, opening=False, cut=False, step=1.0):
@@ -258,7 +258,7 @@ def test_rods_ends_lie_on_the_nearest_edge_half_a_gap_below_or_above_it_unless_t
     surface = SimpleNamespace(
         vertices=np.array([*square(0.0, 10.0), *square(4.0, 6.0)]),
         boundary=[np.arange(4), np.arange(4, 8)],
-        size=UNDIVIDED,
+        longer_side=UNDIVIDED,
     )
     net = SimpleNamespace(
         rod_ends=np.arange(8)[::-1],
@@ -344,11 +344,11 @@ def test_a_rim_s_arc_lengths_go_all_round():
     )
 
 
-def test_edges_longer_than_a_fiftieth_of_the_larger_extent_are_divided_evenly_and_keep_their_vertices():
+def test_edges_longer_than_a_fiftieth_of_the_longer_side_are_divided_evenly_and_keep_their_vertices():
     """10 m in plan: no longer than 0.2 m. Of a triangle's edges the first is 0.5 m long, the second has just
     0.2 m, the last as much as both span."""
     corners = np.array([[0.0, 0.0, 0.0], [0.3, 0.4, 0.0], [0.3, 0.4, 0.2]])
-    surface = SimpleNamespace(vertices=corners, boundary=[np.arange(3)], size=np.array([10.0, 4.0, 50.0]))
+    surface = SimpleNamespace(vertices=corners, boundary=[np.arange(3)], longer_side=10.0)
     (rim,) = edges_of(surface)
     shares = [(0, 0), (1 / 3, 0), (2 / 3, 0), (1, 0), (1, 0.2), (2 / 3, 0.4 / 3), (1 / 3, 0.2 / 3)]
     np.testing.assert_allclose(rim.points, [(0.3 * a, 0.4 * a, z) for a, z in shares], atol=1e-12)
@@ -362,7 +362,7 @@ def test_ends_that_were_cut_off_are_chained_up_to_two_and_a_half_spacings_and_re
     surface = SimpleNamespace(
         vertices=2.0 * np.array([*square(0.0, 10.0), *square(4.0, 6.0)]),
         boundary=[np.arange(4), np.arange(4, 8)],
-        size=UNDIVIDED,
+        longer_side=UNDIVIDED,
     )
     net = SimpleNamespace(
         rod_ends=np.arange(6),

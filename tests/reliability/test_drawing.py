@@ -7,6 +7,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
+from shellform.plan_rectangle import axes_in_plan
 from shellform.reliability.drawing import (
     PERFECT,
     Imperfections,
@@ -15,7 +16,6 @@ from shellform.reliability.drawing import (
     built_load,
     draw_errors,
     errors_of,
-    halves,
     sizes,
     variables,
 )
@@ -196,11 +196,16 @@ def test_rods_bow_and_stiffen_with_their_locks_and_connectors_each_and_all_toget
 
 
 def test_one_half_of_the_plan_is_heavier_by_as_much_as_the_other_is_lighter_and_by_the_share_on_average():
-    places = np.array([[0.0, 10.0, 1.0], [1.0, 10.0, 2.0], [5.0, 40.0, 3.0], [6.0, 20.0, 9.0]])
-    shares = halves(places)
-    assert shares[:, 0] == pytest.approx(np.array([-3.0, -2.0, 2.0, 3.0]) / 2.5)
-    assert shares[:, 1] == pytest.approx(np.array([-10.0, -10.0, 20.0, 0.0]) / 10.0)
-    assert halves(places * [1.0, 0.0, 1.0])[:, 1].tolist() == [0.0] * 4, "in a row there is no other half"
+    places = np.array([[0.0, 0.0, 1.0], [5.0, 0.0, 2.0], [5.0, 40.0, 3.0], [0.0, 20.0, 9.0]])
+    shares = replace(two_rods(), places=places).halves
+    assert shares[:, 0] == pytest.approx([-1.0, 1.0, 1.0, -1.0])
+    assert shares[:, 1] == pytest.approx(np.array([-15.0, -15.0, 25.0, 5.0]) / 15.0)
+    slanting = places.copy()
+    slanting[:, :2] = places[:, :2] @ axes_in_plan(0.5).T
+    assert replace(two_rods(), places=slanting).halves == pytest.approx(shares), "however it is turned"
+    row = replace(two_rods(), places=np.array([1.0, 2.0, 5.0, 6.0])[:, None] * [1.0, 1.0, 0.0]).halves
+    sizes_in_row = np.sort(np.abs(row).mean(axis=0))
+    assert sizes_in_row == pytest.approx([0.0, 1.0], abs=1e-12), "in a row there is no other half"
 
 
 def test_loads_of_zones_halves_and_the_whole_multiply():

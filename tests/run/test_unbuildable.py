@@ -55,7 +55,7 @@ def placed(out):
 
 
 def of_size(*size):
-    return SimpleNamespace(size=np.array(size), source="a mesh")
+    return SimpleNamespace(size=np.array(size), longer_side=max(size[:2]), source="a mesh")
 
 
 @pytest.mark.parametrize("size", [(0.2, 0.1, 9.0), (0.1, 0.2, 0.0), (150.0, 1.0, 400.0), (3.0, 149.0, 1.0)])
@@ -116,7 +116,8 @@ def test_of_files_that_state_their_own_unit_no_option_is_named_which_they_would_
 ):
     file = tmp_path / "a.step"
     file.write_text("ISO-10303-21;")
-    surface = SimpleNamespace(size=np.array([side, side, 0.3 * side]), source=str(file))
+    size = np.array([side, side, 0.3 * side])
+    surface = SimpleNamespace(size=size, longer_side=side, source=str(file))
     with pytest.raises(InputError, match="which no gridshell is") as told:
         refuse_size(surface)
     assert told.value.remedy.startswith(
@@ -229,6 +230,7 @@ BENT = np.array([[0.1, -8.0], [0.5, -2.0], [1.0, 0.3], [0.0, 0.0]])
 SURFACE = SimpleNamespace(
     vertices=np.array([[9.0, 9.0, 9.0], [1.5, 2.0, 3.0], [4.0, 5.0, 6.0], [0.0, 0.0, 0.0]]),
     boundary=[np.array([0]), np.array([3])],
+    longer_side=12.0,
     size=np.array([6.0, 12.0, 40.0]),
 )
 

@@ -96,7 +96,7 @@ def faired(surface: Surface, radius: float) -> Faired:
     require_number(
         radius, above=0.0, where="fair", give="the tightest curvature's radius in metres, such as 0.2"
     )
-    side = float(surface.size[:2].max())
+    side = surface.longer_side
     if radius > side:
         raise InputError(
             f"is more than the surface's size of {side:.3g} m: rounded so far it would be another one",

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.compiled import njit
 from shellform.errors import InputError, how_many
+from shellform.plan_rectangle import sides_in_plan
 from shellform.surface.shape.jets import jets
 from shellform.surface.shape.triangles import (
     adjacency,
@@ -65,6 +66,11 @@ class Surface(Record):
     def size(self) -> Reals:
         """Extents (3,), m, along x, y and z."""
         return np.asarray(np.ptp(self.vertices, axis=0))
+
+    @cached_property
+    def longer_side(self) -> float:
+        """The longer side, m, of its plan, however that is turned."""
+        return float(sides_in_plan(self.vertices).max())
 
     @cached_property
     def boundary(self) -> tuple[Indices, ...]:
