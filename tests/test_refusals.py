@@ -21,7 +21,7 @@ from shellform.reliability.safety import Safety
 from shellform.run.figures import wish
 from shellform.run.sizes import DesignWish
 from shellform.site.retensioning import Crew
-from shellform.site.scans import read_points
+from shellform.site.scan_points import read_points
 from shellform.structure.answers.results import read_sections
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.sections import isotropic

@@ -15,7 +15,8 @@ from shellform.errors import InputError, require_known
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.run.folder import Run, read_run
 from shellform.site import measurements
-from shellform.site.scans import Scan, read_points
+from shellform.site.scan_points import read_points
+from shellform.site.scans import Scan
 from shellform.written import make_folder
 
 

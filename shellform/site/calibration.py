@@ -34,7 +34,7 @@ from shellform.problem.paths import follow
 from shellform.site.identifiability import Identifiability, identifiability, nuisance
 from shellform.site.markers import Markers, marked, markers_of
 from shellform.site.measurements import check_noise
-from shellform.site.scans import Match, Scan, apart, distances, laid
+from shellform.site.scans import Match, Scan, apart, distances, laid, refuse_unlike
 from shellform.structure.answers.sensitivity import by_stiffness, respond, state_by_design, stiffness_rate
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -89,7 +89,9 @@ class Calibration(Record):
                 result.append(
                     f"Scan {number}: points {', '.join(map(str, each.outliers))} belong to no marker."
                 )
-            result += [f"Scan {number}: {doubt}" for doubt in each.doubts]
+        for doubt in dict.fromkeys(doubt for each in self.matches for doubt in each.doubts):
+            own = [str(k) for k, each in enumerate(self.matches, 1) if doubt in each.doubts]
+            result.append(f"Scan{'s' * (len(own) > 1)} {', '.join(own)}: {doubt}")
         return result
 
     def table(self) -> str:
@@ -186,6 +188,8 @@ def calibrate(
             _refuse(begun)
         carried, near = more, [begun[k].equilibrium.state for k in more]
     joint, states, matches, fitted = _rounds(model, joint, near, scans, task)
+    after = distances(scans, matches, states, markers)
+    refuse_unlike(after, beside)
     fit = _Fit(model, joint, states, scans, matches, markers, offsets)
     deviation = fit.deviation(len(fitted))
     known = fit.identifiability(first, max(noise, deviation))
@@ -198,7 +202,7 @@ def calibrate(
         markers=markers_of(shell.net.grid, markers),
         matches=tuple(matches),
         before=before,
-        after=distances(scans, matches, states, markers),
+        after=after,
         residual=deviation,
         states=tuple(states),
         evaluations=model.evaluations,

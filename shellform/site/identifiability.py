@@ -16,6 +16,7 @@ from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.structure.elements.state import State
 
 TELLABLE = 0.5  # relative deviation of a parameter beyond which the data don't tell it
+_UNKNOWN = 1e-12  # of the largest: information that is rounding alone
 _APART = 0.95  # correlation of two parameters from which they can't be told apart
 
 
@@ -87,9 +88,11 @@ def identifiability(names: Sequence[str], jacobian: Reals, raw: Reals, noise: fl
             kept.pop(int(np.argmin(scale)))
             continue
         # Scaled to a unit diagonal, stiffnesses of which one hardly matters don't spoil the inverse.
-        covariance = np.linalg.pinv(information / np.outer(scale, scale), hermitian=True) / np.outer(
-            scale, scale
-        )
+        known, along = np.linalg.eigh(information / np.outer(scale, scale))
+        if known[0] < _UNKNOWN * known[-1]:  # nothing tells this combination of them
+            kept.pop(int(np.argmax(np.abs(along[:, 0]))))
+            continue
+        covariance = along / known @ along.T / np.outer(scale, scale)
         deviation[kept] = np.sqrt(np.diag(covariance))
         correlation = np.eye(size)
         correlation[np.ix_(kept, kept)] = covariance / np.outer(deviation[kept], deviation[kept])

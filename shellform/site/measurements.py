@@ -76,6 +76,13 @@ def names_in(cells: Sequence[str]) -> list[str]:
     return [each.strip().lower() for each in cells]
 
 
+def refuse_twice(file: Path, names: Sequence[str], needed: Sequence[str]) -> None:
+    """Raises InputError for columns' names of which a `needed` one is there twice."""
+    for name in needed:
+        if names.count(name) > 1:
+            raise InputError(f"has two columns {name!r}", where=str(file), remedy="Name each column once.")
+
+
 def too_many_cells(file: Path, line: int, cells: int, columns: int) -> InputError:
     """What a line with more cells than the file has columns is refused with: numbers with decimal commas have
     two."""
@@ -109,9 +116,7 @@ def read_table(
                 value=", ".join(first),
                 remedy=columns,
             )
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"has two columns {name!r}", where=str(file), remedy="Name each column once.")
+    refuse_twice(file, names, names)
     rows = []
     for number, cells in lines[1:]:
         if len(cells) > len(names):

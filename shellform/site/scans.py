@@ -1,4 +1,4 @@
-"""Scans of a built grid: points read from a file, laid onto the model and named after its nodes.
+"""Scans of a built grid: points laid onto the model and named after its nodes.
 
 A scanner gives points in its own axes and in no order; some markers are hidden, some points are reflections.
 The points are laid onto the predicted nodes by a rigid motion (no scaling), found by iterating closest points
@@ -9,15 +9,15 @@ both sets laid over each other, turned about their common normal and flipped. Wh
 hidden, middles lie more than half a cell of the grid apart, and points come to rest beside the markers that
 they are: so from the best of some that are turned otherwise each neighbouring marker is tried, as long as
 that fits better. The best of all wins; a second pairing that fits nearly as well makes the match doubtful,
-which is said and not guessed.
+which is said and not guessed. Scans that a scanner took in the same axes are laid alike: on a symmetric shell
+noise would else decide for each how it is turned. Of the motions that fit one of them the one wins by which
+all together fit best.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -25,9 +25,7 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.errors import InputError
 from shellform.site import measurements
-from shellform.site.measurements import names_in, numbered_cells, too_many_cells
 from shellform.structure.elements.state import State
-from shellform.surface.units import unit_factor
 
 _OTHERWISE = 4  # ways that points are turned, from which neighbours are tried
 _BESIDE = 8  # nearest markers onto which all are moved on from where they came to rest
@@ -98,66 +96,6 @@ _Fitted = tuple[float, Indices, Motion]
 """What closest points came to: the cost, the marker (k,) of each point or -1, and the motion."""
 
 
-def read_points(path: str | Path, *, unit: str = "m") -> Reals:
-    """Points (k, 3), m, from a CSV file: columns x, y, z by their names in the first line or, without names,
-    the first three; lines that start with # and lines whose coordinates are all empty (markers out of sight)
-    are passed over. Raises InputError."""
-    metres = unit_factor(unit, where="scan.unit")
-    file = Path(path)
-    rows = numbered_cells(file, "Give a text file: x, y, z of a point in each line.")
-    columns = [0, 1, 2]
-    names = names_in(rows[0][1]) if rows else []
-    named = {"x", "y", "z"} <= set(names)
-    if named:
-        columns = [names.index(each) for each in "xyz"]
-        rows = rows[1:]
-    elif rows and _are_numbered([cells for _, cells in rows]):
-        raise InputError(
-            "has points with numbers, and no names of columns",
-            where=str(file),
-            value=", ".join(rows[0][1]),
-            remedy="Name the columns in the first line: x, y, z, and node or crossing where the numbers are those.",
-        )
-    found = []
-    for line, row in rows:
-        if named and len(row) > len(names):
-            raise too_many_cells(file, line, len(row), len(names))
-        cells = [row[k].strip() if k < len(row) else "" for k in columns]
-        if any(cells):
-            try:
-                point = [float(each) for each in cells]
-            except ValueError as error:
-                raise InputError(
-                    "must be three numbers",
-                    where=f"{file}, line {line}",
-                    value=cells,
-                    remedy="Write them with decimal points: 0.0125."
-                    if any("," in cell for cell in cells)
-                    else "Write three numbers, or none where a marker is hidden."
-                    if named
-                    else "Name the columns x, y, z in the first line.",
-                ) from error
-            if not all(map(math.isfinite, point)):
-                raise InputError(
-                    "must be three finite numbers",
-                    where=f"{file}, line {line}",
-                    value=cells,
-                    remedy="Leave the three cells empty where a marker is hidden.",
-                )
-            found.append(point)
-    if not found:
-        raise InputError(
-            "has no points", where=str(file), remedy="Give a text file: x, y, z of a point in each line."
-        )
-    return metres * reals(str(file), found, (None, 3))
-
-
-def _are_numbered(rows: Sequence[Sequence[str]]) -> bool:
-    """Whether each row begins with a whole number of its own and has three cells after it."""
-    first = [row[0] for row in rows]
-    return len(set(first)) == len(first) and all(len(row) > 3 and row[0].isdigit() for row in rows)
-
-
 def counted_alike(
     scans: Sequence[Scan], target: Reals, origin: Sequence[float] | None
 ) -> tuple[list[Scan], tuple[str, ...]]:
@@ -188,6 +126,15 @@ def match(points: Reals, markers: Reals, *, reach: float, placed: bool = False) 
     """Names the points (k, 3) after the predicted `markers` (m, 3), none farther than `reach`, m, from its
     own. `placed`: the points are in the model's axes already. Raises InputError where fewer than half of the
     markers are found, or they lie on a line."""
+    cloud = _checked(points, markers)
+    if placed:
+        pairs = _pairs(cKDTree(markers), cloud, reach)
+        return _named(cloud, markers, pairs, Motion(np.eye(3), np.zeros(3)), ())
+    return _matched_alike([cloud], [markers], reach)[0]
+
+
+def _checked(points: Reals, markers: Reals) -> Reals:
+    """The points (k, 3), where they and the markers suffice."""
     cloud = reals("scan.points", points, (None, 3))
     if len(markers) < _PAIRS or len(cloud) < _PAIRS:
         raise InputError(
@@ -199,24 +146,61 @@ def match(points: Reals, markers: Reals, *, reach: float, placed: bool = False) 
     spread = np.linalg.svd(markers - markers.mean(axis=0), compute_uv=False)
     if spread[1] < _THIN * spread[0]:
         raise InputError("the markers lie on a line", where="scan", remedy="Spread them over the grid.")
-    tree = cKDTree(markers)
-    if placed:
-        pairs = _pairs(tree, cloud, reach)
-        return _named(cloud, markers, pairs, Motion(np.eye(3), np.zeros(3)), ())
+    return cloud
+
+
+def _matched_alike(clouds: Sequence[Reals], markers: Sequence[Reals], reach: float) -> list[Match]:
+    """The points (k, 3) of scans in one frame, each named after its own markers (m, 3)."""
+    trees = [cKDTree(each) for each in markers]
+    parts = list(zip(trees, clouds, markers, strict=True))
+    alone = [_fits(*part, reach) for part in parts]
+    if len(parts) == 1:
+        found = [(each,) for each in alone[0]]
+    else:
+        found = [
+            tuple(_closest(*part, start, reach) for part in parts)
+            for fits in alone
+            for _, _, start in _worth_trying(fits)
+        ]
+    best = min(found, key=_cost)
+    rivals = [
+        other
+        for other in found
+        if any(not np.array_equal(one[1], two[1]) for one, two in zip(best, other, strict=True))
+    ]
+    rival = min(rivals, key=_cost, default=None)
+    doubts: tuple[str, ...] = ()
+    if rival is not None and _cost(rival) < _RIVAL * _cost(best):
+        doubts = (
+            f"{_from_one_to_other(best[0][2], rival[0][2], clouds[0], reach)} the points fit nearly as well "
+            f"({_cost(rival) / _cost(best):.2f} times the cost): "
+            "mark the grid less symmetrically, or give the points in the model's axes.",
+        )
+    return [
+        _named(cloud, goal, pairs, motion, doubts)
+        for cloud, goal, (_, pairs, motion) in zip(clouds, markers, best, strict=True)
+    ]
+
+
+def _cost(fits: Sequence[_Fitted]) -> float:
+    """Of scans that are laid alike."""
+    return sum(each[0] for each in fits)
+
+
+def _fits(tree: cKDTree, cloud: Reals, markers: Reals, reach: float) -> list[_Fitted]:
+    """What closest points come to from all starts, and from the best that are turned otherwise beside."""
     found = [_closest(tree, cloud, markers, start, reach) for start in _starts(cloud, markers)]
     found.sort(key=lambda each: each[0])
     for begun in _turned_otherwise(found):
         found += _beside(tree, cloud, markers, begun, reach)
-    cost, pairs, motion = min(found, key=lambda each: each[0])
-    rivals = [other for other in found if not np.array_equal(other[1], pairs)]
-    rival = min(rivals, key=lambda each: each[0], default=None)
-    if rival is None or rival[0] >= _RIVAL * cost:
-        return _named(cloud, markers, pairs, motion, ())
-    doubt = (
-        f"{_from_one_to_other(motion, rival[2], cloud, reach)} the points fit nearly as well ({rival[0] / cost:.2f} times the cost): "
-        "mark the grid less symmetrically, or give the points in the model's axes."
-    )
-    return _named(cloud, markers, pairs, motion, (doubt,))
+    return found
+
+
+def _worth_trying(fits: Sequence[_Fitted]) -> list[_Fitted]:
+    """The best of these, some that are turned otherwise, and the best with other pairs."""
+    by_cost = sorted(fits, key=lambda each: each[0])
+    others = (each for each in by_cost if not np.array_equal(each[1], by_cost[0][1]))
+    return _turned_otherwise(by_cost) + [each for each in [next(others, None)] if each is not None]
 
 
 def _from_one_to_other(one: Motion, other: Motion, cloud: Reals, reach: float) -> str:
@@ -343,23 +327,24 @@ def _axes(points: Reals) -> tuple[Reals, Reals]:
 
 
 def laid(scans: Sequence[Scan], states: Sequence[State], markers: Indices, reach: float) -> list[Match]:
-    """The scans' points named and laid onto the states; scans of one frame by one motion."""
-    found = [
-        match(scan.points, state.positions[markers], reach=reach, placed=scan.frame is None)
-        for scan, state in zip(scans, states, strict=True)
-    ]
-    for frame in sorted({scan.frame for scan in scans if scan.frame is not None}):
+    """The scans' points named and laid onto the states; scans of one frame alike, by one motion."""
+    goals = [state.positions[markers] for state in states]
+    found: dict[int, Match] = {}
+    for frame in dict.fromkeys(scan.frame for scan in scans):
         own = [k for k, scan in enumerate(scans) if scan.frame == frame]
-        points = np.vstack([scans[k].points[found[k].point[found[k].point >= 0]] for k in own])
-        places = np.vstack([states[k].positions[markers][found[k].point >= 0] for k in own])
+        if frame is None:
+            found |= {k: match(scans[k].points, goals[k], reach=reach, placed=True) for k in own}
+            continue
+        clouds = [_checked(scans[k].points, goals[k]) for k in own]
+        alike = dict(zip(own, _matched_alike(clouds, [goals[k] for k in own], reach), strict=True))
+        points = np.vstack([scans[k].points[each.point[each.point >= 0]] for k, each in alike.items()])
+        places = np.vstack([goals[k][each.point >= 0] for k, each in alike.items()])
         motion = rigid_fit(points, places)
-        for k in own:
-            distance = np.linalg.norm(
-                replace(found[k], motion=motion).places(scans[k].points) - states[k].positions[markers],
-                axis=1,
-            )
-            found[k] = replace(found[k], motion=motion, distance=distance)
-    return found
+        for k, each in alike.items():
+            moved = replace(each, motion=motion)
+            distance = np.linalg.norm(moved.places(scans[k].points) - goals[k], axis=1)
+            found[k] = replace(moved, distance=distance)
+    return [found[k] for k in range(len(scans))]
 
 
 def distances(
@@ -371,6 +356,19 @@ def distances(
         for each, scan, state in zip(matches, scans, states, strict=True)
     ]
     return np.linalg.norm(np.array(away).reshape(-1, len(markers), 3), axis=2).T
+
+
+def refuse_unlike(away: Reals, reach: float) -> None:
+    """Raises InputError where distances (m, s), m, of scans from the model, each frame's laid by one motion,
+    are more than the `reach`, m."""
+    farthest = np.nanmax(away, axis=0)
+    if farthest.max() > reach:
+        raise InputError(
+            "doesn't lie on the model as the others do, by one motion for all",
+            where=f"scan {int(np.argmax(farthest)) + 1}",
+            value=f"{1e3 * farthest.max():.3g} mm off",
+            remedy="Give scans that were taken from one place, or all points in the model's axes.",
+        )
 
 
 def apart(one: Motion, other: Motion, place: Reals) -> float:

@@ -20,7 +20,8 @@ from shellform.gridshell.gridshell import Gridshell
 from shellform.gridshell.tolerances import span_of
 from shellform.site import measurements
 from shellform.site.retensioning import Belief
-from shellform.site.scans import match, read_points, rigid_fit
+from shellform.site.scan_points import read_points
+from shellform.site.scans import match, rigid_fit
 from shellform.structure.elements.state import State
 from shellform.surface.units import unit_factor
 

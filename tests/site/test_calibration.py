@@ -11,7 +11,8 @@ from shellform.errors import InputError, NotConverged
 from shellform.site import calibration
 from shellform.site.calibration import calibrate, foresee
 from shellform.site.identifiability import TELLABLE
-from shellform.site.scans import Scan, laid, match, read_points
+from shellform.site.scan_points import read_points
+from shellform.site.scans import Scan, laid, match
 from tests.conftest import braced
 
 NOISE = 0.15e-3

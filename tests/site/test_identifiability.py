@@ -44,6 +44,15 @@ def test_what_moves_no_marker_is_not_told_and_does_not_blur_the_others():
     assert known.singular.max() == pytest.approx(1e2 * np.linalg.norm([[1.0, 1.0], [0.0, 0.1]], 2))
 
 
+def test_of_parameters_that_move_all_markers_alike_one_alone_is_told():
+    """Of a combination that moves nothing the data know nothing, not all."""
+    jacobian = 1e-3 * np.array([[1.0, 1.0, 0.0], [2.0, 2.0, 0.0], [0.0, 0.0, 1.0]])
+    found = identifiability(("a", "b", "c"), jacobian, jacobian, NOISE)
+    assert len(found.tellable) == 2
+    assert np.isinf(found.deviation[:2]).sum() == 1
+    assert found.deviation[2] == pytest.approx(0.01)
+
+
 def test_a_marker_s_reach_is_how_far_one_percent_moves_it():
     found = told(1.0)
     assert found.reach == pytest.approx([1e-5, 1e-5 * 1.01**0.5, 0.0])

@@ -19,7 +19,7 @@ from shellform.site.scans import (
     distances,
     laid,
     match,
-    read_points,
+    refuse_unlike,
     rigid_fit,
 )
 
@@ -269,6 +269,13 @@ def test_placed_scans_in_a_survey_s_coordinates_count_from_the_model_s_origin():
     assert told[0].startswith("surface.origin, (430000, 81000, 400) m, was taken off")
 
 
+def test_a_scan_that_lies_beyond_the_reach_by_the_motion_of_all_is_refused_by_its_number():
+    away = np.array([[0.01, 0.2], [np.nan, 0.51]])
+    refuse_unlike(away, 0.52)
+    with pytest.raises(InputError, match=r"scan 2: doesn't lie on the model.*510 mm off"):
+        refuse_unlike(away, 0.5)
+
+
 def test_how_far_two_motions_lay_points_apart_is_that_of_the_farthest():
     place = np.array([[2.0, 0.0, 0.0], [0.0, 5.0, 0.0]])
     one = Motion(TURN, SHIFT)
@@ -288,35 +295,25 @@ def test_markers_without_a_point_have_no_place():
     assert np.isnan(places[1]).all()
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "0 0 1\n2 -0.5 0\n",
-        " 0  0   1 \n 2 -0.5 0 \n",
-        '"Z" "x" "Y"\n1 0 0\n0 2 -0.5\n',
-        "0\t0\t1\n2\t-0.5\t0\n",
-    ],
-)
-def test_points_may_be_parted_by_blanks_as_scanners_write_them(tmp_path, text):
-    (tmp_path / "scan.xyz").write_text(text, encoding="utf-8")
-    assert read_points(tmp_path / "scan.xyz", unit="mm").tolist() == [
-        [0.0, 0.0, 0.001],
-        [0.002, -0.0005, 0.0],
-    ]
-
-
-def test_a_point_that_is_no_number_is_told_by_its_line(tmp_path):
-    (tmp_path / "scan.csv").write_text("# scan\nx,y,z\n1,2,3\nnan,nan,nan\n", encoding="utf-8")
-    with pytest.raises(
-        InputError, match=r"line 4: must be three finite numbers.*Leave the three cells empty"
-    ):
-        read_points(tmp_path / "scan.csv")
-
-
-def test_points_with_numbers_and_without_names_of_columns_are_not_taken_for_x_y_and_z(tmp_path):
-    file = tmp_path / "scan.csv"
-    file.write_text("7,0.1,0.2,0.3\n3,0.4,0.5,0.6\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"has points with numbers.*7, 0\.1, 0\.2, 0\.3.*Name the columns"):
-        read_points(file)
-    file.write_text("7.0,0.1,0.2,255\n3.0,0.4,0.5,254\n", encoding="utf-8")
-    assert read_points(file).tolist() == [[7.0, 0.1, 0.2], [3.0, 0.4, 0.5]], "with an intensity"
+def test_scans_of_one_frame_are_turned_alike_though_each_alone_fits_as_well_the_other_way_round():
+    """Five by four markers that half a turn lays onto each other but for noise, which speaks for half a turn
+    in one of three scans; all together it speaks for none."""
+    rng = np.random.default_rng(5)
+    x, y = np.meshgrid(np.arange(-2.0, 3.0), [-1.5, -0.5, 0.5, 1.5])
+    goal = np.column_stack([x.ravel(), y.ravel(), 0.2 * (4.0 - x.ravel() ** 2)])
+    states = [SimpleNamespace(positions=goal) for _ in range(3)]
+    odd = 0.004 * np.column_stack([np.zeros((20, 2)), np.sign(x.ravel())])  # no more like this half turned
+    off = [odd, -1.2 * odd, odd]
+    for seed in range(4):
+        order = [rng.permutation(20) for _ in off]
+        taken = [(goal + each + 0.01 * odd)[own] for each, own in zip(off, order, strict=True)]
+        axes = turned(30.0 + 50.0 * seed)
+        frames = [Scan(each @ axes.T + SHIFT, NONE, 0) for each in taken]
+        apart_ = [Scan(each @ axes.T + SHIFT, NONE, k) for k, each in enumerate(taken)]
+        together = laid(frames, states, np.arange(20), 0.4)
+        assert max(np.nanmax(each.distance) for each in together) < 0.05
+        ways = {tuple(own[each.point].tolist()) for own, each in zip(order, together, strict=True)}
+        assert len(ways) == 1, "the same marker is the same point in each"
+        assert all("Turned by 180" in each.doubts[0] for each in together)
+        alone = laid(apart_, states, np.arange(20), 0.4)
+        assert len({tuple(own[each.point].tolist()) for own, each in zip(order, alone, strict=True)}) == 2

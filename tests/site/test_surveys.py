@@ -16,7 +16,9 @@ SHELL = SimpleNamespace(
     target=SimpleNamespace(positions=POSITIONS),
 )
 STATE = SimpleNamespace(positions=POSITIONS)
-WIDE = SimpleNamespace(positions=POSITIONS * [5.0, 5.0, 1.0])  # 20 m
+WIDE = SimpleNamespace(
+    positions=5.0 * np.array([[0, 0, 0], [2, 0, 0], [4, 0, 0.0], [0, 4, 1], [4, 4, 1]])
+)  # 20 m
 NARROW = SimpleNamespace(net=SimpleNamespace(spacing=0.5, grid=SHELL.net.grid), target=WIDE)
 NOISE = 0.2e-3
 
