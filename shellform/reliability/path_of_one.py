@@ -31,7 +31,6 @@ ENDED = "not looked into"
 # cosine of the path's tangent and the softest mode, from which on the load itself is at its limit
 _ALIGNED = 0.5
 
-FAR = 0.05  # of the span from the perfect structure
 STEP = 1.0  # of the load: most structures bear it whole, and others are followed in smaller steps
 MARKED = 1 / 512  # of the load, next to a factor at which it counts on which side a structure falls
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
@@ -144,10 +143,7 @@ class Loading(Branch):
             return DrawnOutcome(self.number, 0.0, False, np.inf, nominal.unloaded, self.spent, snaps)
         if factor < 1.0:
             return DrawnOutcome(self.number, factor, False, np.inf, here.state, self.spent, snaps)
-        far = np.inf
-        if nominal.bears:
-            far = self._farthest(here.state, nominal.states[-1])
-        stands = far <= FAR * nominal.members.span
+        far, stands = nominal.farthest(here.state), nominal.lies_beside(here.state)
         return DrawnOutcome(self.number, factor, stands, far, here.state, self.spent, snaps)
 
     def rested(self, found: DrawnOutcome, share: float, step: float, smallest: float) -> DrawnOutcome:

@@ -22,6 +22,7 @@ from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.loading import SMALLEST
 
 NOMINAL_STEP = 0.125  # of the load, from one kept state of the perfect structure's path to the next
+FAR = 0.05  # of the span from the perfect structure: what rests farther away has fallen
 TO_ITS_END = 0.5  # the same where only the last one is asked for
 
 
@@ -53,6 +54,17 @@ class Perfect(Record):
     def unloaded(self) -> State:
         """The state without load."""
         return self.states[0]
+
+    def farthest(self, state: State) -> float:
+        """How far, m, a node of a drawn structure at rest under the whole load lies from this one's place, at
+        most; inf where this one doesn't bear that load."""
+        if not self.bears:
+            return np.inf
+        return float(np.linalg.norm(state.positions - self.states[-1].positions, axis=1).max())
+
+    def lies_beside(self, state: State) -> bool:
+        """Whether that is within FAR of the span, as of a structure that stands."""
+        return self.farthest(state) <= FAR * self.members.span
 
     def known_to(self, most: float) -> tuple[float, State]:
         """The largest factor of the load, up to `most`, to which the path is known, and the state there."""

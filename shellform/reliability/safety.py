@@ -198,7 +198,7 @@ def paths(loads: Mapping[str, Reals]) -> dict[str, dict[str, float]]:
             share = float(np.vdot(loads[name], loads[largest])) / size[largest] ** 2
             off = np.linalg.norm(loads[name] - share * loads[largest])
             if share > 0.0 and off <= SAME * size[name]:  # what pulls upwards has a path of its own
-                shares[name] = share
+                shares[name] = 1.0 if share >= 1.0 - SAME else share  # of the same load, but for rounding
                 break
         else:
             found[name] = {name: 1.0}

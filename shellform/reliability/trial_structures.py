@@ -129,9 +129,10 @@ class _Count:
             self.rested[path.largest] = replace(known, drawn={**known.drawn, number: found.state})
         if path.of_design_load:
             self.factors[number] = factor
+        beside = path.nominal.lies_beside(found.state)
         for name, share in path.shares.items():
             counts = number in self.asked.numbers or name == self.asked.design_load
-            if counts and factor < share * (1.0 - SAME):
+            if counts and (factor < share * (1.0 - SAME) or (share == 1.0 and not beside)):
                 self.fallen[name].append(number)
 
     @property

@@ -14,6 +14,7 @@ from shellform.reliability.path_of_one import (
     Loading,
     Snap,
 )
+from shellform.reliability.perfect import Perfect
 from shellform.structure.elements.state import at_rest
 
 SPAN = 2.0
@@ -30,12 +31,18 @@ def here(state):
     return SimpleNamespace(state=state)
 
 
+class Nominal(SimpleNamespace):
+    """A perfect structure that can be changed."""
+
+    farthest, lies_beside = Perfect.farthest, Perfect.lies_beside
+
+
 def loading_of(*, bears=True, **own):
     """A structure whose steps are told."""
     loading = object.__new__(Loading)
     loading.number, loading.spent, loading.snaps, loading.span = 7, 20, [], SPAN
     loading.load, loading.assembly = np.full((3, 6), 2.0), "assembly"
-    loading.nominal = SimpleNamespace(
+    loading.nominal = Nominal(
         unloaded="unloaded",
         bears=bears,
         states=(None, "on the way", away(0.0)),

@@ -283,3 +283,12 @@ def test_the_critical_factor_is_sought_of_the_perfect_structure_up_to_what_is_as
     model, how = critical_on_halved("shell", "design", "load", 1.4)
     assert model == ("halved", "shell", "design", "load")
     assert how == {"sought": 1.4, "resolution": 1 / 256}
+
+
+def test_the_same_load_twice_is_one_path_to_the_end_of_which_both_are_judged():
+    """Of every fourth load the product with itself over its squared length is more than 1 by a bit."""
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        load = rng.normal(size=(20, 6))
+        (shares,) = paths({"wet": load, "same": load.copy()}).values()
+        assert shares == {"wet": 1.0, "same": 1.0}

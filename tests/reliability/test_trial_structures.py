@@ -71,7 +71,7 @@ class Tried:
     """Structures that bear factors of the largest load on a path, by number; each takes ten factorisations
     and one for each of its number."""
 
-    def __init__(self, factors, monkeypatch, *, bears=True):
+    def __init__(self, factors, monkeypatch, *, bears=True, far=()):
         self.bears = bears
         self.factors, self.loaded, self.looked, self.before = factors, [], [], []
         for name, fake in [
@@ -82,6 +82,7 @@ class Tried:
                     known_to=lambda f: ("to", f),
                     states=("none", "loaded"),
                     bears=self.bears,
+                    lies_beside=lambda state: self.bears and state not in far,
                 ),
             ),
             ("Workshop", self),
@@ -103,7 +104,7 @@ class Tried:
 
     def limit(self, errors, **how):
         self.looked.append((errors, how))
-        return SimpleNamespace(factor=self.factors[PERFECT], factorisations=100)
+        return SimpleNamespace(factor=self.factors[PERFECT], factorisations=100, state="perfect")
 
     def judged(self, asked, **how):
         return try_structures(None, None, asked, **how)
@@ -138,6 +139,15 @@ def test_structures_fall_under_the_loads_that_they_do_not_bear_and_refuse_where_
     assert made.loaded[0][3] == (1.0, pytest.approx(0.8))
     for may in ({"wet": 1, "wetter": 4}, {"wet": 2, "wetter": 3}):
         assert not made.judged(asked_of(may)).stands
+
+
+def test_a_structure_that_rests_far_from_the_perfect_one_falls_under_the_largest_load_of_its_path(
+    monkeypatch,
+):
+    made = Tried(dict.fromkeys(range(3), 1.0), monkeypatch, far=("rest 1",))
+    found = made.judged(asked_of({"wet": 0, "wetter": 0}, tried=3), whole=True)
+    assert found.fallen == {"wet": (), "wetter": (1,)}
+    assert not found.stands
 
 
 def test_no_more_structures_are_loaded_than_it_takes_to_refuse_but_where_the_whole_sample_is_asked_for(
