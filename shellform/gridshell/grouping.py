@@ -34,6 +34,13 @@ def symmetric_groups(shell: Gridshell) -> Indices:
     """A group number (c,) for every candidate cable. Raises InputError where the net has no symmetry that
     joins any.
     """
+    if not len(shell.cable_ends):
+        raise InputError(
+            "there are no cables to group",
+            where="optimise.symmetric",
+            value=True,
+            remedy="Leave symmetric out.",
+        )
     places, ends = _ends(shell)
     tree, reach = cKDTree(places), _TOLERANCE * shell.net.spacing
     count, joined = len(ends), list[Indices]()

@@ -165,6 +165,8 @@ def _slackening(loading: Loading, low: _Point, above: float, left: float) -> tup
     """The point just before the first cable after `low` goes slack, and the cable, if the structure still has
     the stiffness `left` there; None where none does before the factor `above`."""
     ceiling = above
+    if not low.taut.any():
+        return None
     for _ in range(_STEPS):
         own = loading.assembly
         onward = own.by_node(own.factor(low.here.state).solve(loading.load.ravel()[own.free])).ravel()

@@ -284,12 +284,14 @@ class Scaffold:
     def _heights(self, nodes: Indices, share: float) -> Reals:
         """Heights (k,), m, of rods' nodes at that share of raising: of the net between the layers that share,
         and of the rods' distances from it what is upright where the sine of its slope is that share of the
-        target's. At 0 the grid lies on the ground.
+        target's, or where it overhangs the slope itself. At 0 the grid lies on the ground.
         """
         grid, upright = self.shell.net.grid, _upright(self.shell, nodes)
         aside, middle = grid.layer[nodes], self.ground + 0.5 * grid.gap
         net = self.shell.target.positions[nodes, 2] - aside * upright
-        now = np.sqrt(1.0 - share**2 * (1.0 - upright**2))
+        now = np.where(
+            upright >= 0.0, np.sqrt(1.0 - share**2 * (1.0 - upright**2)), np.cos(share * np.arccos(upright))
+        )
         return np.asarray(middle + share * (net - middle) + aside * now)
 
     def _eased(self, state: State, goal: State, moved: Flags) -> Drive:

@@ -154,9 +154,8 @@ def _matched_alike(clouds: Sequence[Reals], markers: Sequence[Reals], reach: flo
     trees = [cKDTree(each) for each in markers]
     parts = list(zip(trees, clouds, markers, strict=True))
     alone = [_fits(*part, reach) for part in parts]
-    if len(parts) == 1:
-        found = [(each,) for each in alone[0]]
-    else:
+    found: list[tuple[_Fitted, ...]] = [(each,) for each in alone[0]]
+    if len(parts) > 1:
         found = [
             tuple(_closest(*part, start, reach) for part in parts)
             for fits in alone

@@ -157,3 +157,8 @@ def test_cut_lengths_are_the_fewest_that_the_turnbuckles_allow():
     np.testing.assert_array_equal(cut_lengths(rest, 0.0), rest)
     with pytest.raises(InputError, match="0 or more"):
         cut_lengths(rest, -1.0)
+
+
+def test_without_cables_there_is_nothing_to_group():
+    with pytest.raises(InputError, match="no cables to group"):
+        symmetric_groups(lying([(1, 2), (2, 1)], np.zeros((0, 2), dtype=np.int64)))

@@ -122,6 +122,21 @@ def test_ropes_that_lead_ends_bend_rods_by_no_more_than_a_share_of_what_the_shel
     assert shares[0] == pytest.approx(120.0)
 
 
+def test_at_its_full_height_a_raised_grid_lies_at_the_target_where_that_overhangs_too(arches):
+    raised = object.__new__(Scaffold)
+    over = np.deg2rad([0.0, 60.0, 120.0])
+    turned = np.column_stack([np.cos(over / 2), np.sin(over / 2), 0.0 * over, 0.0 * over])
+    target = replace(arches.target, quaternions=np.array(arches.target.quaternions))
+    nodes = np.flatnonzero(arches.net.grid.layer)[:3]
+    quaternions = np.array(target.quaternions)
+    quaternions[nodes] = turned
+    net = replace(arches.net, target=replace(target, quaternions=quaternions))
+    raised.shell, raised.ground = replace(arches, net=net), -0.1
+    np.testing.assert_allclose(raised._heights(nodes, 1.0), net.target.positions[nodes, 2], atol=1e-12)
+    aside, middle = net.grid.layer[nodes], -0.1 + 0.5 * net.grid.gap
+    np.testing.assert_allclose(raised._heights(nodes, 0.0), middle + aside, atol=1e-12)
+
+
 def test_a_raised_grid_is_held_by_its_props_from_below_and_its_ropes_from_the_side_alone(arches, erection):
     props = scaffold._propped(arches, None)
     clamps = np.vstack([line.clamps for line in arches.net.edges])[:, 1]
