@@ -145,7 +145,8 @@ def _read(asked: _Asked, file: Path, options: Mapping[str, Any], spacing: float 
     origin = distant_origin(surface, FAR)
     if origin is not None:
         surface, earlier = counted_from(surface, origin), options.get("origin") or (0.0, 0.0, 0.0)
-        options = {**options, "origin": [a + b for a, b in zip(earlier, origin, strict=True)]}
+        levels = {name: options[name] - origin[2] for name in ("above", "ground") if name in options}
+        options = {**options, **levels, "origin": [a + b for a, b in zip(earlier, origin, strict=True)]}
         told = (
             *told,
             f"coordinates count from {options['origin']} m",

@@ -154,6 +154,7 @@ def test_records_of_edges_and_rods_keep_their_levels_and_amounts():
         found, rod_radius_max=NET.rod_radius_max, curvature_limit=None, curvature_utilisation=None
     ) == (replace(NET, curvature_limit=None, curvature_utilisation=None))
     assert size_text((12.0, 0.5, 3.14159)).startswith("12 × 0.5 × 3.142 m")
+    assert size_text((16.0, 16.0, 4.441e-15)).startswith("16 × 16 × 0 m"), "of what is flat"
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from shellform.gridshell.joints import following
 from shellform.gridshell.layers import single
 from shellform.net.chebyshev import pull_net
 from shellform.problem.paths import follow
+from shellform.records.progress import unheard
 from shellform.run import first_net, first_trial, propose
 from shellform.run.first_design import first_design, standing_design
 from shellform.run.first_edges import edge_choices
@@ -73,6 +74,7 @@ from shellform.structure.elements.sections import Round, Tube, mass_per_length, 
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.target import curvature, make_surface
 from tests.net.edge_shells import barrel, sail
+from tests.surface.shells import cap, write_obj
 
 DOME = Path(__file__).parent.parent / "data" / "dome_mm.step"
 
@@ -262,6 +264,22 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_surface_is_read(tmp_
     with pytest.raises(InputError, match=r"no\.stl"):
         propose_case(tmp_path / "no.stl", tmp_path / "mine.toml", {}, allow_scripts=False)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("given", [{}, {"origin": [0.0, 0.0, 1000.0]}])
+def test_levels_of_a_surface_far_away_count_from_the_origin_that_is_written_with_them(tmp_path, given):
+    """A cap of 1.5 m at 1300 m, cut off 0.1 m above its edge."""
+    points, quads = cap()
+    far = write_obj(tmp_path / "far.obj", 0.25 * points + [0.0, 0.0, 1300.0], quads)
+    asked = propose._Asked(far, tmp_path / "far.toml", False, unheard)
+    counted = 1300.0 - given.get("origin", [0.0, 0.0, 0.0])[2]
+    options = {**given, "above": counted + 0.1, "ground": counted + 0.02}
+    ready = propose._read(asked, far, options, None)
+    assert ready.options["origin"][2] == 1300.0
+    assert [ready.options[each] for each in ("above", "ground")] == pytest.approx([0.1, 0.02])
+    again = surface_of(propose.surface_entry(far, ready.options))
+    np.testing.assert_allclose(again.vertices, ready.surface.vertices, atol=1e-9)
+    assert again.vertices[:, 2].min() == pytest.approx(0.1, abs=1e-6)
 
 
 def test_what_is_wished_for_is_checked():

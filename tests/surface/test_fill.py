@@ -171,7 +171,9 @@ def test_the_ground_may_lie_lower_than_the_edge():
     draft = arched(0.5)
     sunk = filled(draft, "shell", what="edges", ground=-0.001)
     assert closed_loops(open_edges(sunk.triangles))
-    with pytest.raises(InputError, match=r"fewer than two places.*ground"):
+    low = draft.points[draft.points[:, 2].argmin(), 2]
+    told = rf"surface\.ground: .*fewer than two places.* at {low:.6g} to .* m \(found '-1 m in the file'\)"
+    with pytest.raises(InputError, match=told):
         filled(draft, "shell", what="edges", ground=-1.0)
 
 

@@ -56,6 +56,8 @@ def filled(
     narrow = openings.narrower(narrower)
     for loop in holes if every else narrow:
         closed = _with_fill(closed, *_capped(draft.points, normals, loop, where))
+    if what in ("edges", "all") and ground is not None:
+        _refuse_off_ground(draft.points[outer, 2], low[outer], ground)
     arches = _arches(outer, low, where) if what in ("edges", "all") else []
     for arch in arches:
         closed = _with_fill(closed, *_footed(draft.points, normals, arch, level, where))
@@ -135,6 +137,20 @@ class _Arch(Record):
     vertices: Indices
     before: int
     after: int
+
+
+def _refuse_off_ground(heights: Reals, low: Flags, ground: float) -> None:
+    """Raises InputError where an outer edge at these `heights` (n,), m, lies `low` (n,) at a given height of
+    the ground at fewer than two places."""
+    if low.sum() < 2:
+        raise InputError(
+            "the edge touches the ground that is given at fewer than two places, so that it can't be brought down "
+            f"between them: in the file it lies at {heights.min():.6g} to {heights.max():.6g} m",
+            where="surface.ground",
+            value=f"{ground:.6g} m in the file",
+            remedy="Give a height nearer to the edge's lowest, counted from surface.origin where that is given, or "
+            "leave it out for that.",
+        )
 
 
 def _arches(outer: Indices, low: Flags, where: str) -> list[_Arch]:
