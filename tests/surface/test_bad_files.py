@@ -155,6 +155,12 @@ def test_lines_that_can_not_be_read_are_quoted_by_number(tmp_path):
         refused(tmp_path / "a.obj", f"line {good.count(chr(10)) + 1}", bad)
     (tmp_path / "a.obj").write_text(good + "f 1 2 999\n")
     refused(tmp_path / "a.obj", "a face names vertex 999, of 117")
+    last = good.count(chr(10)) + 1
+    for bad in ("f 0 1 2", "f 1 2 0/3"):
+        (tmp_path / "a.obj").write_text(good + bad + "\n")
+        refused(tmp_path / "a.obj", f"line {last}: indices count from 1", "found 0")
+    (tmp_path / "a.obj").write_text(good + "f 1 2 -118\n")
+    refused(tmp_path / "a.obj", f"line {last}: a face names a vertex before the first of 117", "found -118")
     (tmp_path / "a.obj").write_text(good + f"f 1 2 {10**20}\n")
     refused(tmp_path / "a.obj", "a number beyond all counts")
     text = write_off(tmp_path / "a.off", POINTS, QUADS).read_text().splitlines()

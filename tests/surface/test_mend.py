@@ -220,6 +220,10 @@ def test_a_solid_gives_its_upper_or_lower_face_when_asked(inside_out):
     upper = mended(points, faces, face="upper")
     as_clean(upper)
     told(upper, "the upper face of a closed skin was taken")
+    told(
+        mended(POINTS, TRIANGLES, face="upper"),
+        "nothing in it is closed, as a solid is: no upper face was sought",
+    )
     lower = mended(points, faces, face="lower")
     assert len(lower.triangles) == len(TRIANGLES)
     assert lower.vertices[:, 2].max() == pytest.approx(1.3, abs=1e-6)

@@ -32,8 +32,11 @@ def read_obj(file: Path, choice: Choice) -> Draft:
             if key == "v":
                 points.append([float(rest[0]), float(rest[1]), float(rest[2])])
             elif key == "f":
-                corners = [int(each.partition("/")[0]) for each in rest]
-                corners = [c - 1 if c > 0 else c + len(points) for c in corners]
+                given = [int(each.partition("/")[0]) for each in rest]
+                corners = [each - 1 if each > 0 else each + len(points) for each in given]
+                for each, corner in zip(given, corners, strict=True):
+                    if each == 0 or corner < 0:
+                        raise _no_vertex(file, number, each, len(points))
                 groups.setdefault((group, name), {}).setdefault(len(corners), []).append(corners)
             elif key == "o":
                 name = " ".join(rest)
@@ -148,6 +151,17 @@ def _lines(file: Path) -> list[str]:
             "isn't a text file", where=str(file), remedy="Check that its ending fits its content."
         )
     return text.replace("\\\n", " ").splitlines()
+
+
+def _no_vertex(file: Path, number: int, given: int, points: int) -> InputError:
+    """For the index 0, or one that counts backwards past the first of so many points."""
+    first = "indices count from 1, or backwards from -1"
+    return InputError(
+        first if given == 0 else f"a face names a vertex before the first of {points}; {first}",
+        where=f"{file}, line {number}",
+        value=given,
+        remedy=_ANEW,
+    )
 
 
 def _bad_line(file: Path, number: int, line: str) -> InputError:
