@@ -23,7 +23,7 @@ def analyse(
     method: Annotated[
         str,
         typer.Option(
-            help="relaxation (Newton's with a vanishing mass), dynamic (with velocity and time step) or newton."
+            help="relaxation (Newton's with a vanishing mass), dynamic (with velocity and time step), newton, or path (as --path)."
         ),
     ] = "relaxation",
     path: Annotated[

@@ -179,7 +179,7 @@ def net_at(
 ) -> Net:
     """The net with these settings at the `angle`, rad, and `offset`: `pull_net`, whose errors it raises."""
     steps, tuned = settings.spacings, settings.tuning
-    _check(surface, settings)
+    require_settings(surface, settings)
     _check_place(angle, offset)
     limits = _limits(settings)
     density = _densities(settings.spring_density, settings.start)
@@ -232,7 +232,7 @@ def _limits(settings: NetSettings) -> NetLimits:
     return NetLimits(settings.ground, None if outline is None else reals("net.outline", outline, (None, 2)))
 
 
-def _check(surface: Surface, settings: NetSettings) -> None:
+def require_settings(surface: Surface, settings: NetSettings) -> None:
     """Raises InputError for settings that can't work on this surface."""
     steps, gap = settings.spacings, settings.gap
     x, y = sides_in_plan(surface.vertices).tolist()

@@ -21,8 +21,8 @@ from typing import Any, Literal
 import numpy as np
 
 from shellform.compiled import set_num_threads
-from shellform.errors import InputError, ShellformError
-from shellform.net.chebyshev import Method, NetSettings, NetTuning, net_at
+from shellform.errors import InputError, NotConverged
+from shellform.net.chebyshev import Method, NetSettings, NetTuning, net_at, require_settings
 from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.pull import SHEAR_STIFFNESS
@@ -93,8 +93,9 @@ def best_orientation(
     """The best trial, at the `offset` (None: the best of four), and all of those pulled, the best compass
     net's where no pull succeeds.
 
-    Raises InputError where no orientation gives a net.
+    Raises InputError for settings that no angle helps, and where no orientation gives a net.
     """
+    require_settings(surface, settings)
     quarter = 0.5 * math.pi
     if settings.spacing_v not in (None, settings.spacing):
         quarter = math.pi  # u and v differ
@@ -184,6 +185,6 @@ def _try(surface: Surface, settings: NetSettings, job: Job) -> TriedNet:
     changed = replace(settings, method=method, elements=elements, tuning=NetTuning(tail=tail))
     try:
         net = net_at(surface, changed, angle=angle, offset=offset)
-    except ShellformError as error:
-        return TriedNet(angle, offset, math.inf, str(error))
+    except (InputError, NotConverged) as error:
+        return TriedNet(angle, offset, math.inf, error.what)
     return TriedNet(angle, offset, float(np.round(cost(net), 12)))

@@ -184,7 +184,7 @@ def nearness(quality: Quality, grid: Grid, state: State) -> str:
         return ""
     worst = int(np.argmax(np.abs(error)))
     points = crossing_points(grid, state)
-    place = points[neighbours(grid)[0][worst]].mean(axis=0).round(3).tolist()
+    place = (points[neighbours(grid)[0][worst]].mean(axis=0).round(3) + 0.0).tolist()  # no -0.0
     off, usual = 100.0 * abs(error[worst]), f"{100.0 * SPACING_ERROR:.2f}"
     told = f"{off:.2f}" if f"{off:.2f}" != usual else f"{off:.4f}"  # what it may be isn't what it is
     return (

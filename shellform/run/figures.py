@@ -33,6 +33,7 @@ _LOADS = {"none": "no load", "design": "design load", "additional": "additional 
 QUANTITIES = (*maps.QUANTITIES, "spring", "history")
 FILMS = ("pour", "erection")
 _STILL = ("spring", "mode", "history")  # of one state, or of none
+_OPTIONS = {"view": "--view", "size": "--size", "thickness": "--rods"}  # of what is looked at how
 _FILMED = "Give --film erection, or leave it out."
 _USUAL = (1600, 1000)  # pixels
 
@@ -113,13 +114,19 @@ def wish(
         require_known(kind, kinds, where="--format", what="is no format of it")
     chosen_kinds = (kind,) if kind else kinds if film else kinds[:1]
     usual = "utilisation" if film == "erection" else "deviation"
+    pixels = None if size is None else _pixels(size)
+    try:
+        Look(view=view, thickness=thickness, size=pixels or Look.size)
+    except InputError as error:
+        option = _OPTIONS[error.where]
+        raise InputError(error.what, where=option, value=error.value, remedy=error.remedy) from error
     return Wish(
         design=design,
         load=load,
         quantity=quantity or usual,
         limit=limit,
         view=view,
-        size=None if size is None else _pixels(size),
+        size=pixels,
         thickness=thickness,
         transparent=transparent,
         endings=tuple(f".{each}" for each in chosen_kinds),

@@ -53,6 +53,11 @@ def test_where_no_angle_gives_a_net_it_is_said_why():
         best_orientation(ball(30), NetSettings(spacing=0.3, gap=0.005))
 
 
+def test_what_no_angle_helps_is_refused_as_such():
+    with pytest.raises(InputError, match=r"^joint\.gap: must be positive and well below the spacing"):
+        best_orientation(ball(30), NetSettings(spacing=0.3, gap=0.2))
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="where no other system ends them with their run")
 def test_processes_that_try_nets_end_with_the_one_that_is_killed():
     """They waited for work for ever."""

@@ -43,6 +43,7 @@ def searched(monkeypatch, price, settings=None, offset=None):
         yield run
 
     monkeypatch.setattr(orientation, "_runner", runner)
+    monkeypatch.setattr(orientation, "require_settings", lambda *_: None)
     best, tried = best_orientation(None, settings or SETTINGS, offset=offset)
     return best, tried, stages
 
@@ -155,5 +156,5 @@ def test_trials_have_two_elements_a_segment_at_most_and_cost_infinitely_where_th
 
     monkeypatch.setattr(orientation, "net_at", fail)
     assert orientation._try(None, settings, (0.4, (0.5, 0.0), "pull", 0)) == TriedNet(
-        0.4, (0.5, 0.0), math.inf, "net: it can't be"
+        0.4, (0.5, 0.0), math.inf, "it can't be"
     )

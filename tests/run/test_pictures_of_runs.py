@@ -287,6 +287,10 @@ def test_the_options_of_the_command_become_a_wish():
         ({"quantity": "colour"}, "Known: deviation, utilisation, curvature, shear, mode, spring, history"),
         ({"size": "640"}, "WIDTHxHEIGHT"),
         ({"limit": 0.0}, "--limit: must be positive"),
+        ({"thickness": -1.0}, "^--rods: must be 0 or more"),
+        ({"view": "left"}, "^--view: is no view.*Known: best, front, side, top"),
+        ({"size": "0x0"}, "^--size: is too small"),
+        ({"size": "9000x200"}, "^--size: is too large"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(given, message):
