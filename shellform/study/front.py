@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from shellform.study.outcome import Row, Status, Value
+from shellform.study.varied import LimitEntry
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Front:
     """
 
     signs: Mapping[str, float]
-    limits: Mapping[str, float]
+    limits: Mapping[str, LimitEntry]
     found: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
     def add(self, row: Row) -> list[str]:
@@ -54,15 +55,11 @@ def objectives(columns: Mapping[str, Value | None], signs: Mapping[str, float]) 
     return tuple(found) or None
 
 
-def usable(row: Row, limits: Mapping[str, float]) -> bool:
+def usable(row: Row, limits: Mapping[str, LimitEntry]) -> bool:
     """Whether a design is done and keeps the limits."""
     if row.status is not Status.DONE:
         return False
-    values = {name: row.columns.get(name) for name in limits}
-    return all(
-        value is not None and not isinstance(value, str) and value <= limits[name]
-        for name, value in values.items()
-    )
+    return all(limit.beyond(row.columns.get(name)) <= 0.0 for name, limit in limits.items())
 
 
 def _beats(one: tuple[float, ...], other: tuple[float, ...]) -> bool:

@@ -97,7 +97,7 @@ def work(job: Job, before: Outcome | None = None) -> Outcome:
         key=job.key,
         status=status,
         reason=reason.replace(str(folder), "RUN"),
-        values=flat(tree),
+        values={k: v.replace(str(folder), "RUN") if isinstance(v, str) else v for k, v in flat(tree).items()},
         seconds={**found.seconds, "here": round(time.perf_counter() - began, 4)},
         worker=socket.gethostname(),
     )

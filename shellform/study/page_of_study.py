@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from shellform.errors import InputError
+from shellform.errors import InputError, how_many
 from shellform.output.page.measures import entry_measure, summary_measure
 from shellform.output.page.study_page import (
     StudyContent,
@@ -25,8 +25,10 @@ from shellform.run.pages import FILE, write_page
 from shellform.study.front import Front, signed
 from shellform.study.outcome import Row, Status
 from shellform.study.plan import Plan
-from shellform.study.store import read_table
+from shellform.study.store import has_column, read_table
 from shellform.written import write_text
+
+_HOLDS = "verdict.holds"  # whether the design to build does; None where it wasn't examined
 
 
 def write_study_page(folder: Path, plan: Plan) -> Path:
@@ -38,7 +40,8 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
             [*entry.vary, *(n for each in entry.designs for n in each), *entry.function]
         )
     ]
-    table = read_table(folder, ["number", "key", "status", "reason", *own, *entry.column])
+    names = ["number", "key", "status", "reason", *own, *entry.column]
+    table = read_table(folder, [*names, *([_HOLDS] if has_column(folder, _HOLDS) else [])])
     columns: dict[str, list[Any]] = table.to_pydict()
     count = table.num_rows
     signs = signed(entry.objective)
@@ -58,8 +61,20 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
         if len(rows) == count
         else [f"{len(rows)} of {count} designs are drawn, those on the front among them."]
     )
+    gone = sum(not (folder / "runs" / key).is_dir() for key in ordered)
     if entry.keep == "none":
         notes.append("No run was kept (keep), so that there are no pictures.")
+    elif gone:
+        notes.append(
+            f"Of {gone} of {len(ordered)} best designs no run was kept, which were none of the best under other objectives: "
+            'give the study another --output, or keep = "all".'
+        )
+    fallen = sum(_falls(columns, first[key]) for key in ordered)
+    if fallen:
+        notes.append(
+            f"{how_many(fallen, 'best design does', 'best designs do')} not hold: to leave such out, add the column "
+            'holds = "verdict.holds" and [limit] holds = { least = 1 }.'
+        )
     if pictures:
         notes.append(
             f"Pictures: distance from the target under the design load, from 0 (dark) to {1e3 * limit:.3g} "
@@ -88,6 +103,11 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
     )
     write_text(folder / "study.html", study_page(content))
     return folder / "study.html"
+
+
+def _falls(columns: Mapping[str, Sequence[Any]], k: int) -> bool:
+    """Whether a design was examined and doesn't hold."""
+    return _HOLDS in columns and columns[_HOLDS][k] in (False, 0)
 
 
 def _row(columns: Mapping[str, Sequence[Any]], k: int, names: Sequence[str]) -> StudyRow:

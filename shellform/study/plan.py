@@ -31,16 +31,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from shellform.case.case import Case, make_case, read_toml, set_entry, with_joint
 from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError
 from shellform.study.expressions import evaluate
 from shellform.study.files_below import inside, matching
-from shellform.study.outcome import OWN_COLUMNS, Single, Value
+from shellform.study.outcome import OWN_COLUMNS, Value
+from shellform.study.varied import MOST, LimitEntry, StudyEntry, VaryEntry, drawn, ranged
 
-_MOST = 1_000_000  # designs
 _LONGEST = 31e6  # s, a year
 _LEAVES = {"values", "low", "high", "count", "scale", "whole", "files"}
 _COLUMNS = {
@@ -54,38 +54,7 @@ Unit = Callable[[float], Value]
 """From [0, 1) to a value."""
 
 
-class _Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class VaryEntry(_Entry):
-    """How one entry of the case varies: a list, a range, or files."""
-
-    values: list[Single] | None = Field(None, min_length=1, description="the values themselves")
-    low: float | None = Field(None, description="of a range")
-    high: float | None = Field(None, description="of a range")
-    count: int | None = Field(None, ge=1, le=_MOST, description="of values that a grid takes from a range")
-    scale: Literal["linear", "log"] = Field("linear", description="log: equal ratios")
-    whole: bool = Field(False, description="whole numbers alone")
-    files: str | None = Field(
-        None, description='pattern of files beside or below the study file, like "shells/*.step"'
-    )
-
-    @model_validator(mode="after")
-    def _one_way(self) -> VaryEntry:
-        if (self.low is None) != (self.high is None):
-            raise ValueError("a range needs both low and high; add the other")
-        if [self.values, self.low, self.files].count(None) != 2:
-            raise ValueError("give one of: a list of values, low and high, files")
-        if self.low is not None and self.high is not None:
-            if not self.low < self.high:
-                raise ValueError("low must be below high; change places of the two")
-            if self.scale == "log" and self.low <= 0.0:
-                raise ValueError("equal ratios need a low above zero; raise it, or leave scale out")
-        return self
-
-
-class Study(_Entry):
+class Study(StudyEntry):
     """A study file's entries."""
 
     title: str = ""
@@ -97,7 +66,7 @@ class Study(_Entry):
     method: Literal["grid", "random", "latin", "sobol", "search"] = Field(
         "grid", description="how the varied entries combine"
     )
-    count: int | None = Field(None, ge=1, le=_MOST, description="of designs, for all methods but grid")
+    count: int | None = Field(None, ge=1, le=MOST, description="of designs, for all methods but grid")
     population: int = Field(24, ge=2, le=10_000, description="of a search's generation")
     seed: int = Field(1, ge=0, lt=2**32)
     longest: float = Field(21600.0, gt=0.0, le=_LONGEST, description="time for one design, s")
@@ -111,7 +80,10 @@ class Study(_Entry):
         _COLUMNS, description="name = path in summary.json; designs.best is the one to build"
     )
     objective: dict[str, Literal["min", "max"]] = Field({}, description="columns to be small or large")
-    limit: dict[str, float] = Field({}, description="largest value of a column in a usable design")
+    limit: dict[str, LimitEntry] = Field(
+        {},
+        description="of a column in a usable design: its largest value, or what it is to be at least or at most",
+    )
 
     @field_validator("set", "function", mode="before")
     @classmethod
@@ -125,6 +97,13 @@ class Study(_Entry):
         if not isinstance(found, dict):
             return found
         return {k: {"values": v} if isinstance(v, list) else v for k, v in found.items()}
+
+    @field_validator("limit", mode="before")
+    @classmethod
+    def _largest(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        return {k: v if isinstance(v, dict) else {"most": v} for k, v in value.items()}
 
     @field_validator("designs", mode="before")
     @classmethod
@@ -223,24 +202,17 @@ def make_plan(study: Study, file: Path) -> Plan:
             at = [k / max(1, entry.count - 1) for k in range(entry.count)]
             lists[name] = list(dict.fromkeys(ranged(entry, each) for each in at))
         else:
-            ranges[name] = lambda at, entry=entry: ranged(entry, at)  # type: ignore[misc]
+            ranges[name] = lambda at, entry=entry: drawn(entry, at)  # type: ignore[misc]
     plan = Plan(study, file, tables, base, lists, ranges)
-    if length(plan) > _MOST:
+    if length(plan) > MOST:
         raise InputError(
-            f"makes {length(plan):,} designs; up to {_MOST:,} are taken",
+            f"makes {length(plan):,} designs; up to {MOST:,} are taken",
             where=str(file),
             remedy="Give fewer values a variable, or sample them.",
         )
     if study.method != "search":
         resolved(plan, next(iter(changes(plan))))  # what is wrong with all designs is wrong with the study
     return plan
-
-
-def ranged(entry: VaryEntry, at: float) -> Value:
-    """The value of a range at 0 (low) to 1 (high)."""
-    low, high = float(entry.low or 0.0), float(entry.high or 0.0)
-    value = low * (high / low) ** at if entry.scale == "log" else low + at * (high - low)
-    return round(value) if entry.whole else min(max(value, low), high)
 
 
 def length(plan: Plan) -> int:

@@ -49,14 +49,9 @@ def generations(
                 continue
             if entry.limit:
                 trial.set_user_attr(
-                    "excess", [_beyond(row.columns[name], most) for name, most in entry.limit.items()]
+                    "excess", [limit.beyond(row.columns[name]) for name, limit in entry.limit.items()]
                 )
             search.tell(trial, goals)
-
-
-def _beyond(value: Value | None, most: float) -> float:
-    """How far a value is beyond its limit; one that isn't known, or is a word, is."""
-    return 1.0 if value is None or isinstance(value, str) else float(value) - most
 
 
 def _excess(trial: Any) -> list[float]:
@@ -77,7 +72,7 @@ def _asked(plan: Plan, trial: Any, name: str) -> Value:
     entry = plan.study.vary[name]
     log = entry.scale == "log"
     if entry.whole:
-        number: int = trial.suggest_int(name, round(entry.low or 0), round(entry.high or 0), log=log)
+        number: int = trial.suggest_int(name, *entry.whole_ends, log=log)
         return number
     value: float = trial.suggest_float(name, entry.low, entry.high, log=log)
     return value

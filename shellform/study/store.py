@@ -294,6 +294,11 @@ def _array(pa: Any, rows: Sequence[Mapping[str, Any]], name: str, kind: int, for
     return pa.array(values, form)
 
 
+def has_column(folder: Path, name: str) -> bool:
+    """Whether a study's table, which is there, has the column."""
+    return name in arrow()[1].read_schema(folder / "table.parquet").names
+
+
 def read_table(folder: str | Path, columns: Sequence[str] | None = None, filters: Any = None) -> Any:
     """A study's table as a `pyarrow.Table`, of some columns and rows if asked: `filters=[("cables", "<",
     100)]`.

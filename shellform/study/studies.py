@@ -39,10 +39,11 @@ from shellform.study.outcome import ListedDesign, Outcome, Row, Status, Value
 from shellform.study.page_of_study import write_study_page
 from shellform.study.plan import Plan, changes, length, read_study, resolved
 from shellform.study.store import Log, arrow, cell_of, designs_of, line_of, picked, write_table
-from shellform.written import make_folder, write_text
+from shellform.study.study_copy import COPY, keep_copy, refuse_not_copied
+from shellform.written import make_folder
 
 WRITTEN = (
-    "study.toml", "designs.jsonl", "results.jsonl", "table.parquet", "table.csv", "seconds.csv", "runs", "stages", "study.html",
+    COPY, "designs.jsonl", "results.jsonl", "table.parquet", "table.csv", "seconds.csv", "runs", "stages", "study.html",
 )  # fmt: skip
 _FIRST = ("results.jsonl", "designs.jsonl")  # which a study writes before all others
 _SHARE_OF_TIME = 0.02  # that is spent on bringing the table up to date while the study runs
@@ -137,7 +138,7 @@ def run_study(
         with alone(place), Log(place / "results.jsonl") as log:
             for part in ("runs", "stages"):
                 make_folder(place / part)
-            write_text(place / "study.toml", Path(file).read_text(encoding="utf-8"))
+            keep_copy(place, Path(file))
             front = Front(signed(plan.study.objective), plan.study.limit)
             study = _Studying(plan, place, log, front, StudyProgress(total=length(plan)), show, allow_scripts)
             _go(study, work, partial(engine, workers=workers, scheduler=scheduler, dashboard=dashboard))
@@ -154,6 +155,7 @@ def _refuse_overwriting(place: Path, file: Path) -> None:
     study's own `file` may stand in it.
     """
     if any((place / name).is_file() for name in _FIRST):
+        refuse_not_copied(place, file)
         return
     there = [name for name in WRITTEN if (place / name).exists() and not (place / name).samefile(file)]
     if there:

@@ -4,6 +4,7 @@ import pytest
 
 from shellform.study.front import objectives, signed, usable
 from shellform.study.outcome import Row, Status
+from shellform.study.varied import LimitEntry
 
 
 def test_what_shall_be_large_counts_with_its_sign_turned_and_not_scaled():
@@ -26,7 +27,7 @@ def test_a_design_that_lacks_a_number_for_one_objective_has_none(wrong):
     [(1.0, 3.0, True), (1.1, 3.0, False), (1.0, 3.1, False), (None, 3.0, False), (1.0, "slack", False), (True, -3, True)],
 )  # fmt: skip
 def test_a_usable_design_is_done_and_keeps_every_limit(a, b, fits):
-    limits = {"a": 1.0, "b": 3.0}
+    limits = {"a": LimitEntry(most=1.0), "b": LimitEntry(most=3.0)}
     assert usable(Row("k", Status.DONE, "", {"a": a, "b": b, "c": 99.0}), limits) == fits
     assert not usable(Row("k", Status.NO_RESULT, "", {"a": 0.0, "b": 0.0}), limits)
     assert usable(Row("k", Status.DONE, "", {}), {})

@@ -33,9 +33,9 @@ from shellform.study.front import Front, signed
 from shellform.study.jobs import Job, work
 from shellform.study.live import _line
 from shellform.study.outcome import Outcome, Row, Status, flat
-from shellform.study.search import _beyond
 from shellform.study.store import Log, read_table
 from shellform.study.studies import run_study
+from shellform.study.varied import LimitEntry
 from tests.command import begin
 from tests.stubs import ROOT, deadly, quick, slow, stuck, study_file
 
@@ -507,6 +507,24 @@ def test_files_that_no_study_wrote_are_not_overwritten(tmp_path, on_two, name):
     assert own.read_text(encoding="utf-8") == "mine"
 
 
+def test_another_study_in_the_folder_of_one_overwrites_its_copy_and_no_file_that_somebody_wrote(
+    tmp_path, on_two
+):
+    out = tmp_path / "out"
+    run_study(study_file(tmp_path, GRID), out, work=quick)
+    assert (
+        (out / "study.toml")
+        .read_text(encoding="utf-8")
+        .startswith("# Copied by shellform study from study.toml\n")
+    )
+    run_study(study_file(tmp_path, GRID + "\n# other\n"), out, work=quick)
+    assert (out / "study.toml").read_text(encoding="utf-8").endswith("# other\n")
+    (out / "study.toml").write_text("# mine\n" + GRID, encoding="utf-8")
+    with pytest.raises(InputError, match=r"study\.toml: is no copy of a study.*another --output"):
+        run_study(study_file(tmp_path, GRID), out, work=quick)
+    assert (out / "study.toml").read_text(encoding="utf-8").startswith("# mine")
+
+
 def test_a_study_s_folder_may_hold_its_study_file_and_other_files_and_what_is_left_of_it(tmp_path, on_two):
     file = study_file(tmp_path, GRID)
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
@@ -571,7 +589,7 @@ def test_a_search_is_the_same_from_its_seed_however_often_it_was_stopped(tmp_pat
 
 
 def test_the_front_holds_what_nothing_beats_and_keeps_limits():
-    front = Front(signed({"a": "min", "b": "max"}), {"a": 5.0})
+    front = Front(signed({"a": "min", "b": "max"}), {"a": LimitEntry(most=5.0)})
     for key, a, b, off in [
         ("one", 1, 1, []),
         ("worse", 2, 1, ["worse"]),
@@ -589,14 +607,12 @@ def test_the_front_holds_what_nothing_beats_and_keeps_limits():
     assert set(front.found) == {"best", "same", "at its limit"}
 
 
-def test_a_search_counts_what_is_beyond_a_limit_or_not_known():
-    assert [_beyond(value, 2.0) for value in (2.0, 1.5, 3.0, None, "limit point")] == [
-        0.0,
-        -0.5,
-        1.0,
-        1.0,
-        1.0,
-    ]
+def test_a_search_counts_what_is_beyond_a_limit_on_either_side_or_not_known():
+    most, both = LimitEntry(most=2.0), LimitEntry(least=0.9, most=2.0)
+    values = (2.0, 1.5, 3.0, None, "limit point")
+    assert [most.beyond(value) for value in values] == [0.0, -0.5, 1.0, 1.0, 1.0]
+    assert [both.beyond(value) for value in (0.9, 0.5, 1.0, 2.5)] == pytest.approx([0.0, 0.4, -0.1, 0.5])
+    assert [LimitEntry(least=1.0).beyond(value) for value in (True, False)] == [0.0, 1.0], "of a yes or no"
 
 
 def test_summaries_become_columns():

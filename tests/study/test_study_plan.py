@@ -1,5 +1,7 @@
 """Study files are data: what they say is checked, and nothing in them is run or leads out of their folder."""
 
+import tomllib
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -9,7 +11,8 @@ from shellform.errors import InputError
 from shellform.study import plan as plans
 from shellform.study.expressions import evaluate
 from shellform.study.outcome import OWN_COLUMNS
-from shellform.study.plan import Study, VaryEntry, changes, length, placed, ranged, read_study, resolved
+from shellform.study.plan import Study, changes, length, placed, read_study, resolved
+from shellform.study.varied import LimitEntry, VaryEntry, drawn, ranged
 from tests.command import ROOT
 from tests.stubs import CASE, study_file
 
@@ -212,7 +215,7 @@ def test_a_study_may_not_name_a_case_outside_its_folder(tmp_path):
     [
         ({"low": 2.0, "high": 8.0}, [2.0, 3.5, 5.0, 8.0]),
         ({"low": 2.0, "high": 32.0, "scale": "log"}, [2.0, 4.0, 8.0, 32.0]),
-        ({"low": -3.0, "high": 4.6, "whole": True}, [-3, -1, 1, 5]),
+        ({"low": -3.4, "high": 5.6, "whole": True}, [-3, -1, 1, 5]),
         ({"low": 10.0, "high": 2560.0, "scale": "log", "whole": True}, [10, 40, 160, 2560]),
     ],
 )
@@ -220,6 +223,30 @@ def test_a_range_is_walked_from_low_to_high_in_equal_steps_or_equal_ratios(entry
     found = [ranged(VaryEntry(**entry), at) for at in (0.0, 0.25, 0.5, 1.0)]
     assert found == pytest.approx(values)
     assert {type(each) for each in found} == {int if entry.get("whole") else float}
+
+
+def test_whole_numbers_of_a_range_lie_within_it_and_each_is_drawn_as_often():
+    for scale, low, high, values in (("linear", 1.4, 4.6, [2, 3, 4]), ("linear", 1, 4, [1, 2, 3, 4])):
+        entry = VaryEntry(low=low, high=high, scale=scale, whole=True)
+        found = [drawn(entry, (k + 0.5) / 120) for k in range(120)]
+        assert {each: found.count(each) for each in sorted(set(found))} == dict.fromkeys(
+            values, 120 // len(values)
+        )
+    log = VaryEntry(low=0.5, high=8.2, scale="log", whole=True)
+    found = [drawn(log, k / 200) for k in range(200)]
+    assert set(found) == set(range(1, 9))
+    assert found.count(1) > found.count(2) > found.count(8)
+    with pytest.raises(ValidationError, match="no whole number lies between"):
+        VaryEntry(low=1.2, high=1.8, whole=True)
+
+
+def test_a_limit_is_a_largest_value_or_says_what_is_the_least_and_the_most(tmp_path):
+    given = 'case = "dome.toml"\n[column]\na = "x"\nb = "y"\n[limit]\na = 3\nb = { least = 0.97 }\n'
+    study = Study.model_validate(tomllib.loads(given))
+    assert study.limit == {"a": LimitEntry(most=3.0), "b": LimitEntry(least=0.97)}
+    for wrong, said in (("{}", "give a number"), ("{ least = 3, most = 2 }", "least must not be above most")):
+        with pytest.raises(ValidationError, match=said):
+            Study.model_validate(tomllib.loads(given.replace("a = 3", f"a = {wrong}")))
 
 
 def test_rounding_leads_no_value_out_of_its_range():
