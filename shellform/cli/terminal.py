@@ -97,7 +97,7 @@ def tell_designs(summary: Summary) -> None:
         print(f"objective {number(found.objective_start)} -> {number(found.objective_end)}: {found.status}")
         over = not_kept(found.constraints)
         if over:
-            print(f"limits that are not kept: {', '.join(over)}")
+            print(f"limits that the optimised design doesn't keep: {', '.join(over)}")
     for each in summary.sections or ():
         tried = (
             "no design"

@@ -24,7 +24,7 @@ def share_of_limit(name: str, residual: float) -> float | None:
     if kind == "softness":
         return math.sqrt(max(1.0 - residual, 0.0))
     if kind in AT_LEAST:
-        return 1.0 - residual
+        return max(1.0 - residual, 0.0)  # what hangs slack pulls with nothing
     return math.sqrt(max(1.0 + residual, 0.0)) if kind in _SQUARED else 1.0 + residual
 
 

@@ -321,15 +321,19 @@ def _built_deviation(row: LoadRecord) -> float | None:
     return None if row.built_shape is None else row.built_shape.deviation_max_worst
 
 
+_SLACK = "Leave limits.slack_min out, or this load out of limits.slack_loads."  # of what pulls with nothing
+
+
 def _taut(rows: Mapping[str, DesignRecord], designs: Sequence[str], load: str, least: float) -> Check:
     """The least pull of a cable."""
     cells = {}
     for name in designs:
         row = rows[name].loads.get(load) if name in rows else None
         pull = None if row is None else row.cable_force_min
-        remedy = (
-            allow_less("limits.slack_min", pull) if pull else "Leave limits.slack_min out, or let it be 0.01."
-        )
+        if row is not None and not rows[name].cables:
+            cells[name] = Cell("no cable", True)
+            continue
+        remedy = allow_less("limits.slack_min", pull) if pull else _SLACK
         if row is not None and row.collapsed:
             remedy = ""
         cells[name] = (

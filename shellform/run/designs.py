@@ -160,7 +160,7 @@ def load_record(
         thrust_max=float(np.hypot(*push[:, :2].T).max()),
         edge_utilisation_max=edge_utilisation(shell, beams, beams.local_forces(state)),
         cable_force_max=float(pull.max(initial=0.0)),
-        cable_force_min=float(pull.min()) if len(pull) else 0.0,
+        cable_force_min=float(pull.min()) if len(pull) else None,
         cables_slack=int((pull <= 0.0).sum()),
         slack=slack_names(pull),
         multiple=multiple,

@@ -82,7 +82,7 @@ def test_what_a_designer_asks_first_is_told_in_millimetres_with_what_snapped_and
     assert lines == [
         "initial    42 cables  design:   12.3 mm max,   4.5 mean (snapped)",
         "objective 1 -> 0.4: no better design",
-        "limits that are not kept: cable_force at 100.1% of it, uplift",
+        "limits that the optimised design doesn't keep: cable_force at 100.1% of it, uplift",
         "⌀ 8 mm  objective 0.456, 30 cables",
         "⌀ 10 mm  objective 0.4, 31 cables: it is too stiff",
         "⌀ 6 mm  no design: it falls",

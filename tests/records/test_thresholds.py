@@ -75,10 +75,19 @@ def test_a_cable_s_least_pull_may_lack_a_thousandth_of_what_is_asked_for(shell, 
     assert made["Least pull of a cable under no load"].holds is holds
 
 
+def test_without_a_cable_none_hangs_slack(shell, designs):
+    asked = replace(BOUNDS, slack=0.5, slack_loads=("none",))
+    seen = summary(designs, "none", cable_force_min=None)
+    bare = {name: replace(each, cables=0) for name, each in seen.designs.items()}
+    made = checks({"polished": shell}, designs, replace(seen, designs=bare), asked)
+    (cell,) = (each.cells["polished"] for each in made if each.name == "Least pull of a cable under no load")
+    assert (cell.found, cell.holds) == ("no cable", True)
+
+
 def test_without_a_pull_the_limit_of_pulls_is_left_out(shell, designs):
     asked = replace(BOUNDS, slack=0.5, slack_loads=("none",))
     made = found(shell, designs, "none", bounds=asked, cable_force_min=0.0)
-    assert "0.01" in made["Least pull of a cable under no load"].remedy
+    assert made["Least pull of a cable under no load"].remedy.endswith("out of limits.slack_loads.")
     for pull in (0.41, 0.4199):  # what is rounded up would be refused again
         made = found(shell, designs, "none", bounds=asked, cable_force_min=pull)
         assert made["Least pull of a cable under no load"].remedy == "Allow limits.slack_min = 0.41."

@@ -418,7 +418,10 @@ def test_wishes_for_cables_are_checked_on_the_design_to_build(shell, designs):
 def test_the_terminal_names_limits_that_are_broken_by_more_than_a_thousandth(capsys):
     told = made.summary(["optimised"], constraints={"cable_force": 0.0016, "misfit": 0.0008})
     tell_designs(told)
-    assert "limits that are not kept: cable_force at 100.2% of it\n" in capsys.readouterr().out
+    assert (
+        "limits that the optimised design doesn't keep: cable_force at 100.2% of it\n"
+        in capsys.readouterr().out
+    )
 
 
 def test_checks_under_a_load_that_is_no_multiple_of_the_design_load_name_no_factor(shell, designs):
