@@ -41,6 +41,7 @@ from shellform.structure.solve.loading import Loaded
 from shellform.tables import Table, table_text
 from shellform.written import write_text
 
+_UNLED = ("climb", "descend")  # phases in which no structure as built was drawn yet
 _QUIET = 10.0  # s between two notes on the judgement of a design
 _UNLOADED = 15  # evaluations at most, of the design without regard to the loads
 
@@ -132,7 +133,8 @@ def _best(
     def watch(step: Step) -> None:
         rejected = "" if step.accepted else ", rejected"
         left = pace.left(step.evaluation, step.phase)
-        still = "" if left is None else f", about {time_words(left)} left of this stage"
+        more = ", more if structures as built lead it" if safety is not None and step.phase in _UNLED else ""
+        still = "" if left is None else f", about {time_words(left)} left of this stage{more}"
         workspace.report(
             Event(
                 "optimise",
@@ -143,7 +145,7 @@ def _best(
             )
         )
 
-    problem = case_problem(workspace.case, shell, loads, start)
+    problem, safety = case_problem(workspace.case, shell, loads, start), case_safety(workspace.case, shell)
     key = workspace.keys["optimise"]
     checkpoint = load_checkpoint(workspace.folder, key)
     if checkpoint is not None:
@@ -154,7 +156,7 @@ def _best(
         start,
         solver=_solver(workspace.case),
         evaluations=entry.evaluations,
-        safety=case_safety(workspace.case, shell),
+        safety=safety,
         progress=watch,
         keep=lambda checkpoint: save_checkpoint(workspace.folder, key, checkpoint),
         judging=_judging(workspace),

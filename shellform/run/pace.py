@@ -30,8 +30,9 @@ class Pace:
     """An estimate for `planned` evaluations in all and what comes `afterwards`, counted in evaluations of the
     first phase.
 
-    Each phase of a search has its own pace: one that draws structures is slower by factors than a descent.
-    One that has just begun is taken to go on as the one before. What came before the first note and the
+    The first phase has its own pace, and those after it, which draw structures and change from one to the
+    other, have one in common, slower by factors; where they have just begun they are taken to go on as the
+    first. What came before the first note and the
     compiling of loops tell nothing of what follows, and are left out.
     """
 
@@ -62,11 +63,12 @@ class Pace:
         if not known or not known[0].evaluations:
             return None
         first = pace = known[0].seconds / known[0].evaluations
-        between = 0.0
-        for each in known[1:]:
-            believed = _BELIEVED * pace
-            between = (each.seconds + believed) / (each.notes + _BELIEVED)
-            pace = (each.seconds + believed) / (each.evaluations + _BELIEVED)
+        if len(known) == 1:
+            return first * (missing + self.afterwards)
+        believed = _BELIEVED * first
+        seconds = sum(each.seconds for each in known[1:]) + believed
+        pace = seconds / (sum(each.evaluations for each in known[1:]) + _BELIEVED)
+        between = seconds / (sum(each.notes for each in known[1:]) + _BELIEVED)
         return pace * missing + _CONFIRMING * between + self.afterwards * first
 
 

@@ -22,7 +22,7 @@ def test_what_came_before_the_first_step_is_not_taken_for_its_pace(at):
     assert search.left(1) == pytest.approx(59.0)
 
 
-def test_a_phase_has_its_own_pace_whatever_those_before_it_took(at):
+def test_the_phases_after_the_first_have_a_pace_of_their_own(at):
     search = Pace(1000)
     for step in range(21):
         at(float(step))
@@ -79,7 +79,7 @@ def test_times_are_told_no_finer_than_they_are_known():
     ]
 
 
-def test_each_phase_counts_for_what_it_took_and_for_five_evaluations_at_the_pace_before(at):
+def test_phases_after_the_first_count_for_what_they_took_and_for_five_evaluations_at_its_pace(at):
     """Two evaluations in 6 s, then one note without and three with an evaluation, in 20 s."""
     search = Pace(20, afterwards=10)
     at(1.0)
@@ -92,9 +92,9 @@ def test_each_phase_counts_for_what_it_took_and_for_five_evaluations_at_the_pace
     pace_now, between = (20.0 + 15.0) / (3 + 5), (20.0 + 15.0) / (4 + 5)
     assert left == pytest.approx(pace_now * 14 + between + 3.0 * 10)
     at(37.0)
-    third = search.left(8, "polish")
-    between, pace_now = ((10.0 + 5 * pace_now) / (count + 5) for count in (1, 2))
-    assert third == pytest.approx(pace_now * 12 + between + 3.0 * 10)
+    third = search.left(8, "agree")
+    pace_now, between = (30.0 + 15.0) / (5 + 5), (30.0 + 15.0) / (5 + 5)
+    assert third == pytest.approx(pace_now * 12 + between + 3.0 * 10), "with the phase before"
 
 
 def test_where_time_has_passed_without_an_evaluation_nothing_is_known_of_what_is_left(at):
