@@ -66,8 +66,8 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
         notes.append("No run was kept (keep), so that there are no pictures.")
     elif gone:
         notes.append(
-            f"Of {gone} of {len(ordered)} best designs no run was kept, which were none of the best under other objectives: "
-            'give the study another --output, or keep = "all".'
+            f"Of {gone} of {len(ordered)} best designs no run was kept, which were none of the best under other objectives. "
+            'To have them give the study another --output, and keep = "all" where objectives are to change.'
         )
     fallen = sum(_falls(columns, first[key]) for key in ordered)
     if fallen:
