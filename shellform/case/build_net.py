@@ -80,21 +80,27 @@ def _read(entry: SurfaceEntry, *, allow_scripts: bool) -> Surface:
             value=entry.dimensions,
             remedy="Leave out surface.dimensions, or name a builder script (.py).",
         )
+    from shellform.surface.readers.fills import OffGround
     from shellform.surface.readers.reading import read_surface
 
-    return read_surface(
-        file,
-        unit=entry.unit,
-        up=entry.up,
-        size=entry.size,
-        layer=entry.layer,
-        name=entry.object,
-        face=entry.face,
-        piece=entry.piece,
-        fill=entry.fill,
-        fill_narrower=entry.fill_narrower,
-        ground=None if entry.ground is None else entry.ground + (entry.origin or (0.0, 0.0, 0.0))[2],
-    )
+    level = 0.0 if entry.origin is None else entry.origin[2]  # of the file's, from which the case's count
+    try:
+        return read_surface(
+            file,
+            unit=entry.unit,
+            up=entry.up,
+            size=entry.size,
+            layer=entry.layer,
+            name=entry.object,
+            face=entry.face,
+            piece=entry.piece,
+            fill=entry.fill,
+            fill_narrower=entry.fill_narrower,
+            ground=None if entry.ground is None else entry.ground + level,
+        )
+    except OffGround as error:
+        assert entry.ground is not None
+        raise OffGround(entry.ground, error.lowest - level, error.highest - level) from error
 
 
 def _built(file: Path, entry: SurfaceEntry) -> Surface:

@@ -24,6 +24,7 @@ from shellform.case.entries import NetEntry, SurfaceEntry
 from shellform.errors import InputError
 from shellform.surface.shape.target import Surface
 from tests.records.made import NET
+from tests.surface.shells import cap, write_obj
 
 FLAT = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.5], [3.0, 2.0, 0.0], [0.0, 2.0, 0.5]])
 
@@ -55,6 +56,17 @@ def test_a_surface_is_counted_from_its_origin_before_it_is_cut_off_above_a_level
     found = surface_of(SurfaceEntry(file="a.obj", **entry))
     assert found.vertices[0, 0] == corner
     assert asked == ([] if above is None else [above])
+
+
+def test_a_ground_that_the_edge_does_not_touch_is_refused_in_the_coordinates_it_was_given_in(tmp_path):
+    """A cap whose edge lies at 0 to 0.75 m, 1300 m up."""
+    points, quads = cap()
+    far = str(write_obj(tmp_path / "far.obj", points + np.array([0.0, 0.0, 1300.0]), quads))
+    for origin, ground, edge in [(1300.0, -0.9, "0 to 0.75"), (1000.0, 299.1, "300 to 300.75")]:
+        entry = SurfaceEntry(file=far, fill="edges", ground=ground, origin=(0.0, 0.0, origin))
+        told = rf"^surface\.ground: .*fewer than two places.* at {edge} m \(found {ground}\)\. Give a height"
+        with pytest.raises(InputError, match=told):
+            surface_of(entry)
 
 
 def test_dimensions_are_of_builder_scripts_alone():

@@ -57,7 +57,9 @@ def filled(
     for loop in holes if every else narrow:
         closed = _with_fill(closed, *_capped(draft.points, normals, loop, where))
     if what in ("edges", "all") and ground is not None:
-        _refuse_off_ground(draft.points[outer, 2], low[outer], ground)
+        edge = draft.points[outer, 2]
+        if low[outer].sum() < 2:
+            raise OffGround(ground, float(edge.min()), float(edge.max()))
     arches = _arches(outer, low, where) if what in ("edges", "all") else []
     for arch in arches:
         closed = _with_fill(closed, *_footed(draft.points, normals, arch, level, where))
@@ -88,6 +90,21 @@ def filled(
         estimated = make_surface(closed.points, closed.triangles, source=where).normals
         closed = replace(closed, normals=np.vstack([estimated[:own], closed.normals[own:]]))
     return closed
+
+
+class OffGround(InputError):
+    """A `ground`, m, that was given and that an outer edge, from its `lowest` to its `highest` point, m,
+    touches at fewer than two places."""
+
+    def __init__(self, ground: float, lowest: float, highest: float) -> None:
+        self.lowest, self.highest = lowest, highest
+        super().__init__(
+            "the edge touches the ground that is given at fewer than two places, so that it can't be brought down "
+            f"between them: it lies at {lowest:.6g} to {highest:.6g} m",
+            where="surface.ground",
+            value=ground,
+            remedy="Give a height nearer to the edge's lowest, or leave it out for that.",
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,20 +154,6 @@ class _Arch(Record):
     vertices: Indices
     before: int
     after: int
-
-
-def _refuse_off_ground(heights: Reals, low: Flags, ground: float) -> None:
-    """Raises InputError where an outer edge at these `heights` (n,), m, lies `low` (n,) at a given height of
-    the ground at fewer than two places."""
-    if low.sum() < 2:
-        raise InputError(
-            "the edge touches the ground that is given at fewer than two places, so that it can't be brought down "
-            f"between them: in the file it lies at {heights.min():.6g} to {heights.max():.6g} m",
-            where="surface.ground",
-            value=f"{ground:.6g} m in the file",
-            remedy="Give a height nearer to the edge's lowest, counted from surface.origin where that is given, or "
-            "leave it out for that.",
-        )
 
 
 def _arches(outer: Indices, low: Flags, where: str) -> list[_Arch]:
