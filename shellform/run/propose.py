@@ -52,6 +52,7 @@ from shellform.surface.shape.target import Surface
 from shellform.written import refuse_unwritable, write_named
 
 _SEARCH = 2 / 3  # of the work that a surface is worth: the search for a design of it as it is
+_LEVEL_PLACES = 9  # of a level's metres: 1300.3 less 1300 is 0.3, and not 0.2999999999999545
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 
@@ -145,7 +146,11 @@ def _read(asked: _Asked, file: Path, options: Mapping[str, Any], spacing: float 
     origin = distant_origin(surface, FAR)
     if origin is not None:
         surface, earlier = counted_from(surface, origin), options.get("origin") or (0.0, 0.0, 0.0)
-        levels = {name: options[name] - origin[2] for name in ("above", "ground") if name in options}
+        levels = {
+            name: round(options[name] - origin[2], _LEVEL_PLACES)
+            for name in ("above", "ground")
+            if name in options
+        }
         options = {**options, **levels, "origin": [a + b for a, b in zip(earlier, origin, strict=True)]}
         told = (
             *told,

@@ -276,9 +276,10 @@ def test_levels_of_a_surface_far_away_count_from_the_origin_that_is_written_with
     options = {**given, "above": counted + 0.1, "ground": counted + 0.02}
     ready = propose._read(asked, far, options, None)
     assert ready.options["origin"][2] == 1300.0
-    assert [ready.options[each] for each in ("above", "ground")] == pytest.approx([0.1, 0.02])
+    assert [ready.options[each] for each in ("above", "ground")] == [0.1, 0.02]
     again = surface_of(propose.surface_entry(far, ready.options))
     np.testing.assert_allclose(again.vertices, ready.surface.vertices, atol=1e-9)
+    assert again.area == pytest.approx(ready.surface.area, rel=1e-9)
     assert again.vertices[:, 2].min() == pytest.approx(0.1, abs=1e-6)
 
 
