@@ -153,16 +153,6 @@ def test_lines_that_can_not_be_read_are_quoted_by_number(tmp_path):
     for bad in ("v 1 2", "v one two three", "f 1 2 x"):
         (tmp_path / "a.obj").write_text(good + bad + "\n")
         refused(tmp_path / "a.obj", f"line {good.count(chr(10)) + 1}", bad)
-    (tmp_path / "a.obj").write_text(good + "f 1 2 999\n")
-    refused(tmp_path / "a.obj", "a face names vertex 999, of 117")
-    last = good.count(chr(10)) + 1
-    for bad in ("f 0 1 2", "f 1 2 0/3"):
-        (tmp_path / "a.obj").write_text(good + bad + "\n")
-        refused(tmp_path / "a.obj", f"line {last}: indices count from 1", "found 0")
-    (tmp_path / "a.obj").write_text(good + "f 1 2 -118\n")
-    refused(tmp_path / "a.obj", f"line {last}: a face names a vertex before the first of 117", "found -118")
-    (tmp_path / "a.obj").write_text(good + f"f 1 2 {10**20}\n")
-    refused(tmp_path / "a.obj", "a number beyond all counts")
     text = write_off(tmp_path / "a.off", POINTS, QUADS).read_text().splitlines()
     (tmp_path / "a.off").write_text("\n".join([*text[:10], "0 0 x", *text[11:]]))
     refused(tmp_path / "a.off", "line 11")
@@ -170,6 +160,8 @@ def test_lines_that_can_not_be_read_are_quoted_by_number(tmp_path):
     refused(tmp_path / "a.off", "ends after its first line")
     (tmp_path / "a.off").write_text("\n".join(text[:10]))
     refused(tmp_path / "a.off", f"ends after 7 of {len(POINTS) + len(QUADS)} vertices and faces")
+    (tmp_path / "a.off").write_text("\n".join([*text[:-1], f"3 0 1 {10**20}"]))
+    refused(tmp_path / "a.off", "a number beyond all counts")
     (tmp_path / "a.off").write_text("OFF\n\n3 x 0\n")
     refused(tmp_path / "a.off", "line 3")
     (tmp_path / "a.off").write_text("OFF BINARY\n\1\2")
@@ -183,6 +175,30 @@ def test_lines_that_can_not_be_read_are_quoted_by_number(tmp_path):
     del lines[4]
     (tmp_path / "a.stl").write_text("\n".join(lines))
     refused(tmp_path / "a.stl", "not three a facet")
+
+
+@pytest.mark.parametrize(
+    ("face", "found", "said"),
+    [
+        ("0 1 2", 0, "indices count from 1"),
+        ("1 2 0/3", 0, "indices count from 1"),
+        ("1 2 -118", -118, "a face names a vertex before the first of 117"),
+        ("1 2 119/3", 119, "a face names a vertex after the last of 118"),
+        (f"1 2 {10**20}", 10**20, "a face names a vertex after the last of 118"),
+    ],
+)
+def test_an_index_of_no_vertex_in_an_obj_is_told_as_written_with_its_line(tmp_path, face, found, said):
+    """Of 117 vertices before that line and one after it, which it may name."""
+    good = write_obj(tmp_path / "a.obj", POINTS, QUADS).read_text()
+    (tmp_path / "a.obj").write_text(f"{good}f {face}\nv 9 9 9\nf 1 2 3\n")
+    refused(tmp_path / "a.obj", f"a.obj, line {good.count(chr(10)) + 1}: {said}", f"found {found}")
+
+
+def test_faces_that_come_before_their_vertices_in_an_obj_are_read(tmp_path):
+    file = write_obj(tmp_path / "a.obj", POINTS, QUADS)
+    area = read_surface(file).area
+    file.write_text("\n".join(reversed(file.read_text().splitlines())))
+    assert read_surface(file).area == pytest.approx(area)
 
 
 def test_gltf_files_that_need_what_is_not_here_are_refused_by_name(tmp_path):

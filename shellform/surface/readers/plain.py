@@ -25,6 +25,7 @@ def read_obj(file: Path, choice: Choice) -> Draft:
     """
     points: list[list[float]] = []
     groups: dict[tuple[str, str], dict[int, list[list[int]]]] = {}
+    ahead: list[tuple[int, int]] = []  # indices of vertices that hadn't come yet, with their lines
     name = group = ""
     for number, line in enumerate(_lines(file), 1):
         key, *rest = line.split() or [""]
@@ -33,17 +34,23 @@ def read_obj(file: Path, choice: Choice) -> Draft:
                 points.append([float(rest[0]), float(rest[1]), float(rest[2])])
             elif key == "f":
                 given = [int(each.partition("/")[0]) for each in rest]
-                corners = [each - 1 if each > 0 else each + len(points) for each in given]
-                for each, corner in zip(given, corners, strict=True):
-                    if each == 0 or corner < 0:
+                for each in given:
+                    if each == 0 or each < -len(points):
                         raise _no_vertex(file, number, each, len(points))
+                ahead += [(each, number) for each in given if each > len(points)]
+                corners = [each - 1 if each > 0 else each + len(points) for each in given]
                 groups.setdefault((group, name), {}).setdefault(len(corners), []).append(corners)
             elif key == "o":
                 name = " ".join(rest)
             elif key == "g":
                 group = " ".join(rest)
+        except InputError:  # which is a ValueError
+            raise
         except (ValueError, IndexError) as error:
             raise _bad_line(file, number, line) from error
+    for each, number in ahead:
+        if each > len(points):
+            raise _no_vertex(file, number, each, len(points))
     place = np.array(points, dtype=float).reshape(-1, 3)
     parts = [
         MeshObject(called, layer, place, _blocks(blocks, file)) for (layer, called), blocks in groups.items()
@@ -82,9 +89,9 @@ def read_off(file: Path, choice: Choice) -> Draft:
             else:
                 size = int(row[0])
                 blocks.setdefault(size, []).append([int(row[1 + k]) for k in range(size)])
-        part = MeshObject("", "", np.array(place, dtype=float).reshape(-1, 3), _blocks(blocks, file))
     except (ValueError, IndexError) as error:
         raise _bad_line(file, last, "") from error
+    part = MeshObject("", "", np.array(place, dtype=float).reshape(-1, 3), _blocks(blocks, file))
     return joined([part], choice, str(file))
 
 
@@ -154,10 +161,10 @@ def _lines(file: Path) -> list[str]:
 
 
 def _no_vertex(file: Path, number: int, given: int, points: int) -> InputError:
-    """For the index 0, or one that counts backwards past the first of so many points."""
-    first = "indices count from 1, or backwards from -1"
+    """For the index 0, one past the last of so many points, or one that counts backwards past the first."""
+    missing = f"a face names a vertex {'before the first' if given < 0 else 'after the last'} of {points}; "
     return InputError(
-        first if given == 0 else f"a face names a vertex before the first of {points}; {first}",
+        f"{'' if given == 0 else missing}indices count from 1, or backwards from -1",
         where=f"{file}, line {number}",
         value=given,
         remedy=_ANEW,
