@@ -21,11 +21,12 @@ from typing import Any, Literal
 import numpy as np
 
 from shellform.compiled import set_num_threads
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError
 from shellform.net.chebyshev import Method, NetSettings, NetTuning, net_at, require_settings
 from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.pull import SHEAR_STIFFNESS
+from shellform.net.refusal import Beside, NoNet, Stalled
 from shellform.processes import end_with
 from shellform.surface.shape.target import Surface
 
@@ -43,13 +44,14 @@ Job = tuple[float, tuple[float, float], Method, int]
 @dataclass(frozen=True)
 class TriedNet:
     """One net of the search: `angle`, rad, `offset` in spacings, its `cost`, infinite where there is none,
-    and why.
+    and why, with the `remedy` where that is so at every angle.
     """
 
     angle: float
     offset: tuple[float, float]
     cost: float
     reason: str = ""
+    remedy: str = "Choose a smaller spacing."
 
 
 def cost(net: Net) -> float:
@@ -93,7 +95,7 @@ def best_orientation(
     """The best trial, at the `offset` (None: the best of four), and all of those pulled, the best compass
     net's where no pull succeeds.
 
-    Raises InputError for settings that no angle helps, and where no orientation gives a net.
+    Raises InputError for settings that no angle helps, as it is, and where no orientation gives a net.
     """
     require_settings(surface, settings)
     quarter = 0.5 * math.pi
@@ -127,7 +129,7 @@ def best_orientation(
                 f"no angle gives a net: {compass[0].reason}",
                 where="net.angle",
                 value="auto",
-                remedy="Choose a smaller spacing.",
+                remedy=compass[0].remedy,
             )
         pulled = stage("pulled net", [(trial.angle, at, "pull", tail) for trial in usable[:_BEST]])
         best = min(pulled, key=lambda trial: trial.cost)
@@ -185,6 +187,8 @@ def _try(surface: Surface, settings: NetSettings, job: Job) -> TriedNet:
     changed = replace(settings, method=method, elements=elements, tuning=NetTuning(tail=tail))
     try:
         net = net_at(surface, changed, angle=angle, offset=offset)
-    except (InputError, NotConverged) as error:
+    except (NoNet, Stalled) as error:
         return TriedNet(angle, offset, math.inf, error.what)
+    except Beside as error:  # at this angle, perhaps, and not at others
+        return TriedNet(angle, offset, math.inf, error.what, error.remedy)
     return TriedNet(angle, offset, float(np.round(cost(net), 12)))

@@ -49,13 +49,35 @@ def test_a_given_angle_is_kept(cylinder):
 
 
 def test_where_no_angle_gives_a_net_it_is_said_why():
-    with pytest.raises(InputError, match=r"no angle gives a net: .*curved too much"):
+    with pytest.raises(
+        InputError, match=r"no angle gives a net: .*curved too much.*\. Choose a smaller spacing\.$"
+    ):
         best_orientation(ball(30), NetSettings(spacing=0.3, gap=0.005))
 
 
-def test_what_no_angle_helps_is_refused_as_such():
-    with pytest.raises(InputError, match=r"^joint\.gap: must be positive and well below the spacing"):
-        best_orientation(ball(30), NetSettings(spacing=0.3, gap=0.2))
+def test_an_offset_that_lies_off_the_surface_at_every_angle_is_told_to_be_smaller(cylinder):
+    with pytest.raises(
+        InputError, match=r"no angle gives a net: .* off the surface.*Choose a smaller offset"
+    ):
+        best_orientation(cylinder, NetSettings(spacing=0.25, gap=0.005), offset=(40.0, 0.0))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (
+            {"gap": 0.2},
+            r"^joint\.gap: must be positive and well below the spacing \(found 0\.2\)\. Give metres",
+        ),
+        ({"spring_density": [5.0, 0.5]}, r"^net\.spring_density: must be .*found \[5\.0, 0\.5\]\)\. For"),
+        ({"outline": [[0.0, 0.0, 1.0]]}, r"^net\.outline has the wrong shape"),
+    ],
+)
+def test_what_no_angle_helps_is_refused_as_it_is(given, said, workers):
+    settings = NetSettings(**{"spacing": 0.3, "gap": 0.005, **given})
+    with pytest.raises(InputError, match=said):
+        best_orientation(ball(30), settings, workers=workers)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="where no other system ends them with their run")

@@ -12,6 +12,7 @@ from shellform.errors import InputError
 from shellform.net import orientation
 from shellform.net.chebyshev import NetSettings
 from shellform.net.orientation import TriedNet, best_orientation, cost, oriented_net
+from shellform.net.refusal import NoNet, Reason
 
 SETTINGS = NetSettings(spacing=0.1, gap=0.005)
 
@@ -152,9 +153,9 @@ def test_trials_have_two_elements_a_segment_at_most_and_cost_infinitely_where_th
     assert asked == [(made, 0.4, "compass", 2)]
 
     def fail(_surface, _settings, **_where):
-        raise InputError("it can't be", where="net")
+        raise NoNet(Reason.FOLDED, "it folds", where="net", remedy="Try another angle.")
 
     monkeypatch.setattr(orientation, "net_at", fail)
     assert orientation._try(None, settings, (0.4, (0.5, 0.0), "pull", 0)) == TriedNet(
-        0.4, (0.5, 0.0), math.inf, "it can't be"
+        0.4, (0.5, 0.0), math.inf, "it folds", "Choose a smaller spacing."
     )
