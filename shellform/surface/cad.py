@@ -249,9 +249,9 @@ def _draft(where: Path, meshing: Meshing) -> Draft:
     plan = sides[list(level_axes(meshing.up))]
     size = float(plan.max()) / _DEFAULT_EDGES if meshing.size is None else meshing.size
     points, triangles, normals = mesh_faces(size, where, meshing)
-    of_solid = meshing.face is not None and gmsh.model.getEntities(3)
+    of_solid = meshing.face is not None and bool(gmsh.model.getEntities(3))
     notes = (f"the {meshing.face} face of a solid was taken",) if of_solid else ()
-    return Draft(points, triangles, normals, 1.0, meshing.up, notes)
+    return Draft(points, triangles, normals, 1.0, meshing.up, notes, of_solid=of_solid)
 
 
 def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None:

@@ -292,6 +292,15 @@ def test_a_surface_beside_solids_is_taken_and_a_face_of_one_or_the_other_refused
 
 
 @pytest.mark.parametrize("ending", ["step", "iges", "brep"])
+def test_a_face_of_a_cad_file_without_solids_is_refused(tmp_path, ending):
+    script = tmp_path / "one.py"
+    script.write_text("def build(gmsh, *, side=1.0): gmsh.model.occ.addRectangle(0, 0, 0, side, side)\n")
+    file = tmp_path / f"one.{ending}"
+    cad.write_cad(file, script)
+    refused(file, "surface.face", "isn't closed", "Leave surface.face (--face) out", face="upper")
+
+
+@pytest.mark.parametrize("ending", ["step", "iges", "brep"])
 @pytest.mark.parametrize(("setting", "entry"), [("layer", "surface.layer"), ("name", "surface.object")])
 def test_layers_and_objects_of_cad_files_are_refused(tmp_path, ending, setting, entry):
     script = tmp_path / "one.py"

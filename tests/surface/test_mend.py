@@ -220,14 +220,18 @@ def test_a_solid_gives_its_upper_or_lower_face_when_asked(inside_out):
     upper = mended(points, faces, face="upper")
     as_clean(upper)
     told(upper, "the upper face of a closed skin was taken")
-    told(
-        mended(POINTS, TRIANGLES, face="upper"),
-        "nothing in it is closed, as a solid is: no upper face was sought",
-    )
     lower = mended(points, faces, face="lower")
     assert len(lower.triangles) == len(TRIANGLES)
     assert lower.vertices[:, 2].max() == pytest.approx(1.3, abs=1e-6)
     assert lower.normals[:, 2].min() > 0.0
+
+
+@pytest.mark.parametrize("face", ["upper", "lower"])
+def test_a_face_of_what_is_not_closed_is_refused_unless_its_reader_has_taken_it_of_a_solid(face):
+    said = rf"^surface\.face: shell holds .*isn't closed.*no {face} face.*found '{face}'.*Leave surface\.face"
+    with pytest.raises(InputError, match=said):
+        mended(POINTS, TRIANGLES, face=face)
+    as_clean(surface_of(Draft(POINTS, TRIANGLES, of_solid=True), "shell", face=face))
 
 
 def test_a_ball_has_no_edge_that_sets_off_a_face():

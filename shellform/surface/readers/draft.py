@@ -31,7 +31,8 @@ class Draft(Record):
     """`points` (v, 3) in units of `metres` m (None: the file doesn't say) with the vertical axis `up`;
     `triangles` (t, 3); unit `normals` (v, 3) where the source knows them, zero where it knows others;
     `notes`, a sentence for each thing left out or chosen; `objects`, what the file's objects that it is made
-    of are called, "" where one of them has no name."""
+    of are called, "" where one of them has no name; `of_solid`, whether it is that face of a solid which was
+    asked for."""
 
     points: Reals
     triangles: Indices
@@ -40,6 +41,7 @@ class Draft(Record):
     up: str = "z"
     notes: tuple[str, ...] = ()
     objects: tuple[str, ...] = ()
+    of_solid: bool = False
 
 
 def without_unused(draft: Draft) -> Draft:

@@ -88,6 +88,7 @@ def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest:
             answer["up"],
             tuple(answer["notes"]),
             tuple(answer["objects"]),
+            answer["of_solid"],
         )
 
 
@@ -116,6 +117,7 @@ def _serve() -> None:
             "up": draft.up,
             "notes": list(draft.notes),
             "objects": list(draft.objects),
+            "of_solid": draft.of_solid,
         }
         arrays = {"points": draft.points, "triangles": draft.triangles}
         if draft.normals is not None:

@@ -34,9 +34,7 @@ _LOOSE = 1e-3  # of the area: loose pieces that have less in all are crumbs of a
 _PARTED = 1e-6  # of the size: how far the two sides of a parted vertex move into their faces
 
 
-def mended(
-    draft: Draft, where: str, *, face: str | None = None, of_solid: bool = False, piece: int | None = None
-) -> Draft:
+def mended(draft: Draft, where: str, *, face: str | None = None, piece: int | None = None) -> Draft:
     """The draft as one connected skin with an edge, faces turned alike. Raises InputError for what can't be
     mended and lacks a choice.
     """
@@ -72,7 +70,7 @@ def mended(
             ),
         )
     draft = without_slivers(without_outliers(draft))
-    return without_teeth(_parted(_open(draft, face, of_solid, where), size))
+    return without_teeth(_parted(_open(draft, face, where), size))
 
 
 def turned_alike(triangles: Indices, where: str) -> Indices:
@@ -235,12 +233,18 @@ def _choices(draft: Draft, label: Indices, pieces: Indices) -> str:
     return ", ".join(told)
 
 
-def _open(draft: Draft, face: str | None, of_solid: bool, where: str) -> Draft:
-    """The draft, or of a closed skin its upper or lower face; `of_solid`: its reader has taken that."""
+def _open(draft: Draft, face: str | None, where: str) -> Draft:
+    """The draft, or of a closed skin its upper or lower face. Raises InputError for a face of what isn't
+    closed, or which face isn't said of what is."""
     if 2 * len(shared_edges(draft.triangles)[0]) < 3 * len(draft.triangles):
-        if face is None or of_solid:
+        if face is None or draft.of_solid:
             return draft
-        return noted(draft, f"nothing in it is closed, as a solid is: no {face} face was sought")
+        raise InputError(
+            f"{where} holds a surface that isn't closed, as a solid's skin is: it has no {face} face to choose",
+            where="surface.face",
+            value=face,
+            remedy="Leave surface.face (--face) out.",
+        )
     if face is None:
         raise InputError(
             "is closed, like a solid's skin: it has no edge at which rods could end",

@@ -40,7 +40,6 @@ FORMATS = {
 _HEAD = 65536  # bytes, by which a file's format is told
 _UPRIGHT = 0.25  # plan over area, below which a shell is likely to lie on its side
 _STATED_UNIT = ("step", "iges", "3dm")
-_OF_SOLIDS = ("step", "iges", "brep")  # of which a solid's face is taken as they are read
 _STATED_UP = ("gltf",)  # formats that say which axis is vertical
 _TURNED = "its {} axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"
 # that are taken for the vertical, in this order, where a shell would lie on its side; z is looked at first
@@ -138,8 +137,7 @@ def read_surface(
             metres = unit_factor(unit or "m") if draft.metres is None else draft.metres
             draft = noted(draft, _STEPS.format(metres * step))
         vertical = axis or draft.up
-        upright, of_solid = _upright(draft, unit, vertical), kind in _OF_SOLIDS
-        return mended(upright, str(file), face=face, of_solid=of_solid, piece=piece), vertical
+        return mended(_upright(draft, unit, vertical), str(file), face=face, piece=piece), vertical
 
     as_given, vertical = whole(up)
     # told from the skin as it is: what fills its openings depends on the axis
