@@ -112,7 +112,12 @@ def number(value: float, digits: int = 3) -> str:
 
 def coordinates(point: Iterable[float], digits: int = 3) -> str:
     """A point, m, for people: "(1.2, -3, 0.45)"."""
-    return "(" + ", ".join(f"{each:.{digits}g}" for each in point) + ")"
+    return "(" + ", ".join(f"{each + 0.0:.{digits}g}" for each in point) + ")"
+
+
+def rounded(point: Iterable[float], places: int = 3) -> list[float]:
+    """A point's coordinates, m, to so many decimals, as messages list them: 0.0 for what rounds to -0.0."""
+    return [round(float(each), places) + 0.0 for each in point]
 
 
 def force_unit(most: float) -> tuple[str, float]:

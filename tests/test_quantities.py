@@ -7,7 +7,7 @@ import pytest
 
 from shellform import quantities
 from shellform.errors import InputError
-from shellform.quantities import LENGTHS, STRESSES, Quantity, if_other_unit
+from shellform.quantities import LENGTHS, STRESSES, Quantity, coordinates, if_other_unit, rounded
 
 ALL = {name: each for name, each in vars(quantities).items() if isinstance(each, Quantity)}
 
@@ -52,3 +52,9 @@ def test_numbers_below_zero_are_no_size_and_none_is_one_where_it_may_be():
     assert quantities.KERF.or_none(0.0) == 0.0
     with pytest.raises(InputError, match="positive"):
         quantities.KERF.or_none(-1.0)
+
+
+def test_a_place_that_rounds_to_nothing_less_is_told_as_0():
+    assert str(rounded(np.array([-0.0004, 1.23456, -2.0]))) == "[0.0, 1.235, -2.0]"
+    assert str(rounded((-0.00004, 0.00006), 4)) == "[0.0, 0.0001]"
+    assert coordinates((-0.0, 0.5)) == "(0, 0.5)"

@@ -24,6 +24,7 @@ import numpy as np
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError
 from shellform.net.refusal import NoNet, Reason
+from shellform.quantities import rounded
 
 _ITERATIONS = 30  # of Newton towards one point, at the most
 _CLOSE = 1e-10  # of the spacing
@@ -253,7 +254,7 @@ def _broken(
         if all(p in points for p in ((a, b), (a + step_i, b), (a + step_i, b + step_j), (a, b + step_j)))
     ]
     total = float(gaussian(finder, np.array(cells)).sum()) if cells else math.nan
-    parallel = f"its rods come to run in one direction at {at.round(3).tolist()}"
+    parallel = f"its rods come to run in one direction at {rounded(at)}"
     counted = "from the net's origin to there its Gaussian curvature adds up to"
     what = f"the surface is curved too much for one net: {parallel}"
     remedy = "Try another net.angle or net.offset; where none helps it takes a flatter form."

@@ -14,6 +14,7 @@ from shellform.arrays import Reals, Record, reals
 from shellform.errors import InputError
 from shellform.net.compass import Finder, Guide, raised
 from shellform.net.refusal import Beside, Reason
+from shellform.quantities import rounded
 from shellform.surface.shape.target import Surface
 from shellform.surface.shape.triangles import triangle_areas
 
@@ -68,7 +69,7 @@ def _on_surface(surface: Surface, finder: Finder, plan: Reals, where: str) -> tu
         raise Beside(
             Reason.BESIDE.value,
             where=where,
-            value=plan.round(4).tolist(),
+            value=rounded(plan, 4),
             remedy="Choose a smaller offset, or guides that cross on the surface.",
         )
     return point, foot.normal[0]

@@ -19,6 +19,7 @@ from shellform.errors import how_many
 from shellform.net.compass import Finder, gaussian
 from shellform.net.grid import Grid, cells, crossing_points, neighbours
 from shellform.net.refusal import NoNet, Reason
+from shellform.quantities import rounded
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
 
@@ -136,7 +137,7 @@ def refuse_folds(finder: Finder, grid: Grid, state: State) -> None:
     turned = np.sum(np.cross(np.roll(sides, 1, axis=1), sides) * normal[:, None], axis=2) <= 0.0
     folded = turned.any(axis=1)
     if folded.any():
-        middle = corner[np.argmax(folded)].mean(axis=0).round(3).tolist()
+        middle = rounded(corner[np.argmax(folded)].mean(axis=0))
         raise NoNet(
             Reason.FOLDED,
             f"the net folds over itself in {how_many(int(folded.sum()), 'cell', 'cells')}, first at {middle}: the surface, whose "
@@ -150,7 +151,7 @@ def refuse_folds(finder: Finder, grid: Grid, state: State) -> None:
     close = cKDTree(points).query_pairs(_OVERLAP * min(grid.spacing, grid.spacing_v), output_type="ndarray")
     apart = np.abs(grid.lattice[close[:, 0]] - grid.lattice[close[:, 1]]).max(axis=1, initial=0) > 1
     if apart.any():
-        place = points[close[np.argmax(apart), 0]].round(3).tolist()
+        place = rounded(points[close[np.argmax(apart), 0]])
         raise NoNet(
             Reason.OVERLAPPING,
             f"two parts of the net lie on one another in {int(apart.sum())} places, first at {place}",
@@ -163,7 +164,7 @@ def refuse_folds(finder: Finder, grid: Grid, state: State) -> None:
 def refuse_distance(quality: Quality, grid: Grid, state: State) -> None:
     """Raises InputError for a net that stays off its surface."""
     if quality.distance_max > _FAR * grid.scale:
-        worst = crossing_points(grid, state)[np.argmax(np.abs(quality.distance))].round(3).tolist()
+        worst = rounded(crossing_points(grid, state)[np.argmax(np.abs(quality.distance))])
         raise NoNet(
             Reason.OFF,
             f"the net stays {quality.distance_max:.3g} m off the surface at {worst}: "
@@ -184,7 +185,7 @@ def nearness(quality: Quality, grid: Grid, state: State) -> str:
         return ""
     worst = int(np.argmax(np.abs(error)))
     points = crossing_points(grid, state)
-    place = (points[neighbours(grid)[0][worst]].mean(axis=0).round(3) + 0.0).tolist()  # no -0.0
+    place = rounded(points[neighbours(grid)[0][worst]].mean(axis=0))
     off, usual = 100.0 * abs(error[worst]), f"{100.0 * SPACING_ERROR:.2f}"
     told = f"{off:.2f}" if f"{off:.2f}" != usual else f"{off:.4f}"  # what it may be isn't what it is
     return (

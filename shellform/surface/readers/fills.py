@@ -17,6 +17,7 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals, Record
 from shellform.errors import InputError, how_many
+from shellform.quantities import rounded
 from shellform.surface.readers.draft import Draft, noted
 from shellform.surface.shape.plate import bent_heights
 from shellform.surface.shape.target import ON_GROUND, closed_loops, length_round, make_surface
@@ -289,7 +290,7 @@ def _upright(slopes: Reals) -> Reals:
 def _gradients(normals: Reals, place: Reals, where: str) -> Reals:
     """Slopes (k, 2) of a surface with these normals (k, 3) over its plan."""
     if (normals[:, 2] < _UPRIGHT).any():
-        spot = place[int(np.argmin(normals[:, 2]))].round(3).tolist()
+        spot = rounded(place[int(np.argmin(normals[:, 2]))])
         raise InputError(
             f"is too steep to be continued at {spot} m",
             where=where,

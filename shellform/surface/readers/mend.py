@@ -174,7 +174,7 @@ def _refuse_branches(draft: Draft, where: str) -> None:
         others = choosable(draft)
         raise InputError(
             f"{how_many(int((counts > 2).sum()), 'edge belongs', 'edges belong')} to more than two faces, the first at "
-            f"{place.round(4).tolist()} m",
+            f"{quantities.rounded(place, 4)} m",
             where=where,
             remedy=f"Choose {others}; or remove the faces inside or behind the surface and export it again."
             if others
@@ -226,9 +226,8 @@ def _choices(draft: Draft, label: Indices, pieces: Indices) -> str:
         size = " × ".join(f"{each:.3g}" for each in extent)
         # to a hundredth of its size, however far from the origin
         places = 2 - math.floor(math.log10(extent.max()))
-        middle = ", ".join(
-            f"{round(x, places):.12g}" for x in 0.5 * (points.min(axis=0) + points.max(axis=0))
-        )
+        centre = quantities.rounded(0.5 * (points.min(axis=0) + points.max(axis=0)), places)
+        middle = ", ".join(f"{x:.12g}" for x in centre)
         told.append(f"--piece {number} is {size} m about ({middle})")
     return ", ".join(told)
 

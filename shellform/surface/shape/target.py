@@ -18,6 +18,7 @@ from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.compiled import njit
 from shellform.errors import InputError, how_many
 from shellform.plan_rectangle import sides_in_plan
+from shellform.quantities import rounded
 from shellform.surface.shape.jets import jets
 from shellform.surface.shape.triangles import (
     adjacency,
@@ -229,7 +230,7 @@ def _refuse_pieces(points: Reals, faces: Indices, where: str) -> None:
         a = edges[np.argmax(counts > 2), 0]
         raise InputError(
             f"{how_many(int((counts > 2).sum()), 'edge belongs', 'edges belong')} to more than two triangles, the first at "
-            f"{points[a].round(4).tolist()}",
+            f"{rounded(points[a], 4)}",
             where=where,
             remedy="Remove the faces inside or behind the surface and export it again.",
         )
