@@ -32,6 +32,7 @@ MASSES: Final = {"g": 1e-3}
 _RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _NEWTONS: Final = ((1e7, "MN", 1e6), (1e3, "kN", 1e3))  # from so many N on, so many N a unit
 _STRETCHED_ONCE = 50.0  # per cent: what is less is no rest length of a cable
+_ROUNDING = 1e-9  # of the largest extent
 _TWICE = 1e3  # what is lost where a number in the SI unit was taken for one in its thousandth
 
 
@@ -118,6 +119,12 @@ def coordinates(point: Iterable[float], digits: int = 3) -> str:
 def rounded(point: Iterable[float], places: int = 3) -> list[float]:
     """A point's coordinates, m, to so many decimals, as messages list them: 0.0 for what rounds to -0.0."""
     return [round(float(each), places) + 0.0 for each in point]
+
+
+def extents(size: Iterable[float]) -> list[float]:
+    """A surface's extents, m, as people are told them: 0 for what is rounding alone beside the largest."""
+    sides = [float(each) for each in size]
+    return [each if each > _ROUNDING * max(sides) else 0.0 for each in sides]
 
 
 def force_unit(most: float) -> tuple[str, float]:

@@ -7,7 +7,7 @@ import pytest
 
 from shellform import quantities
 from shellform.errors import InputError
-from shellform.quantities import LENGTHS, STRESSES, Quantity, coordinates, if_other_unit, rounded
+from shellform.quantities import LENGTHS, STRESSES, Quantity, coordinates, extents, if_other_unit, rounded
 
 ALL = {name: each for name, each in vars(quantities).items() if isinstance(each, Quantity)}
 
@@ -58,3 +58,8 @@ def test_a_place_that_rounds_to_nothing_less_is_told_as_0():
     assert str(rounded(np.array([-0.0004, 1.23456, -2.0]))) == "[0.0, 1.235, -2.0]"
     assert str(rounded((-0.00004, 0.00006), 4)) == "[0.0, 0.0001]"
     assert coordinates((-0.0, 0.5)) == "(0, 0.5)"
+
+
+def test_an_extent_that_is_rounding_beside_the_largest_is_told_as_0():
+    assert extents(np.array([16.0, 1.5e-8, 4.441e-15])) == [16.0, 0.0, 0.0]
+    assert extents((16.0, 2e-8, 0.0)) == [16.0, 2e-8, 0.0]

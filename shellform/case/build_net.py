@@ -18,13 +18,12 @@ from shellform.net.chebyshev import NetSettings
 from shellform.net.edges import Edges, Place, stand
 from shellform.net.net import Net
 from shellform.net.orientation import oriented_net
-from shellform.quantities import number
+from shellform.quantities import extents, number
 from shellform.records.summary import EdgeRecord, NetRecord, SurfaceRecord
 from shellform.surface.shape.cut import cut_off
 from shellform.surface.shape.target import Surface
 
 FAR = 100.0  # of a surface's larger side, from its origin: there `new` takes one near it
-_ROUNDING = 1e-9  # of the largest extent
 _DISTANT = 5000.0  # no net is sure to be pulled: at 21 500 none is
 _OF_FILES = ("unit", "up", "layer", "object", "face", "piece", "fill", "fill_narrower", "ground")
 
@@ -139,8 +138,8 @@ def surface_record(surface: Surface, source: str) -> SurfaceRecord:
 
 
 def size_text(size: Sequence[float] | Reals) -> str:
-    """The extents (3,), m, in words, so that a wrong unit is seen; what is rounding alone is 0."""
-    x, y, z = np.where(np.asarray(size) > _ROUNDING * np.max(size), size, 0.0).tolist()
+    """The extents (3,), m, in words, so that a wrong unit is seen."""
+    x, y, z = extents(size)
     return f"{number(x, 4)} × {number(y, 4)} × {number(z, 4)} m (is the unit right?)"
 
 

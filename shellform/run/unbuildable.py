@@ -22,7 +22,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import CONCRETE, pressure
 from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
-from shellform.quantities import coordinates, number
+from shellform.quantities import coordinates, extents, number
 from shellform.run.first_net import bends_to
 from shellform.run.first_trial import NEEDED, STRESSED, FirstDesign
 from shellform.run.sizes import DesignWish, Placed, RodChoice, least_spacing, radius_for
@@ -170,7 +170,7 @@ def refuse_size(surface: Surface) -> None:
     side = surface.longer_side
     if SMALLEST <= side <= LARGEST:
         return
-    x, y, z = surface.size
+    x, y, z = extents(surface.size)
     likely = (2.0, 0.5 * LARGEST)
     taken = [unit for unit in _SUSPECTED if likely[0] <= side * METRES[unit] <= likely[1]]
     stated = [unit for unit in _SUSPECTED if likely[0] <= side / METRES[unit] <= likely[1]]

@@ -159,6 +159,9 @@ def test_of_several_pieces_one_has_to_be_chosen():
     with pytest.raises(InputError, match=r"2 separate pieces, of 27, 6.74 m².*--piece"):
         mended(points, faces)
     as_clean(mended(points, faces, piece=1))
+    flat = points * [1.0, 1.0, 1e-16]
+    with pytest.raises(InputError, match=r"--piece 1 is 6 × 4 × 0 m about \(0, 0, 0\)"):
+        mended(flat, faces)
     small = mended(points, faces, piece=2)
     np.testing.assert_allclose(small.size, 0.5 * CLEAN.size)
     told(small, "piece 2 of 2")

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shellform.output.page.template import filled, part
-from shellform.quantities import number
+from shellform.quantities import extents, number
 from shellform.records.summary import Summary
 
 
@@ -55,7 +55,7 @@ def facts(summary: Summary) -> list[tuple[str, str]]:
     found = []
     if summary.surface is not None:
         surface = summary.surface
-        size = " × ".join(number(1e3 * each, 4) for each in surface.size)
+        size = " × ".join(number(1e3 * each, 4) for each in extents(surface.size))
         found += [
             ("surface", f"{surface.source}, {size} mm, {number(surface.area)} m²"),
             ("mesh of the surface", f"{surface.triangles} triangles, {surface.holes} holes"),

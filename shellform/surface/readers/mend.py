@@ -223,7 +223,7 @@ def _choices(draft: Draft, label: Indices, pieces: Indices) -> str:
     for number, piece in enumerate(pieces.tolist(), 1):
         points = draft.points[np.unique(draft.triangles[label == piece])]
         extent = np.ptp(points, axis=0)
-        size = " × ".join(f"{each:.3g}" for each in extent)
+        size = " × ".join(f"{each:.3g}" for each in quantities.extents(extent))
         # to a hundredth of its size, however far from the origin
         places = 2 - math.floor(math.log10(extent.max()))
         centre = quantities.rounded(0.5 * (points.min(axis=0) + points.max(axis=0)), places)

@@ -18,7 +18,7 @@ from shellform.arrays import Indices, Reals, Record, indices, reals
 from shellform.compiled import njit
 from shellform.errors import InputError, how_many
 from shellform.plan_rectangle import sides_in_plan
-from shellform.quantities import rounded
+from shellform.quantities import extents, rounded
 from shellform.surface.shape.jets import jets
 from shellform.surface.shape.triangles import (
     adjacency,
@@ -53,7 +53,7 @@ class Surface(Record):
         put(self, "normals", reals("normals", self.normals, (count, 3)))
 
     def __repr__(self) -> str:
-        size = " × ".join(f"{each:.3g}" for each in self.size)
+        size = " × ".join(f"{each:.3g}" for each in extents(self.size))
         return (
             f"Surface({len(self.triangles)} triangles, {size} m{f', {self.source}' if self.source else ''})"
         )
