@@ -288,7 +288,7 @@ def test_the_options_of_the_command_become_a_wish():
         ({"size": "640"}, "WIDTHxHEIGHT"),
         ({"limit": 0.0}, "--limit: must be positive"),
         ({"thickness": -1.0}, "^--rods: must be 0 or more"),
-        ({"view": "left"}, "^--view: is no view.*Known: best, front, side, top"),
+        ({"view": "left"}, "^--view: is no view.*Known: best, top, front, side"),
         ({"size": "0x0"}, "^--size: is too small"),
         ({"size": "9000x200"}, "^--size: is too large"),
     ],
