@@ -33,7 +33,8 @@ _LOADS = {"none": "no load", "design": "design load", "additional": "additional 
 QUANTITIES = (*maps.QUANTITIES, "spring", "history")
 FILMS = ("pour", "erection")
 _STILL = ("spring", "mode", "history")  # of one state, or of none
-_OPTIONS = {"view": "--view", "size": "--size", "thickness": "--rods"}  # of what is looked at how
+# of what is looked at how
+_OPTIONS = {"view": "--view", "size": "--size", "thickness": "--rods", "width": "--width-mm"}
 _FILMED = "Give --film erection, or leave it out."
 _USUAL = (1600, 1000)  # pixels
 
@@ -116,7 +117,9 @@ def wish(
     usual = "utilisation" if film == "erection" else "deviation"
     pixels = None if size is None else _pixels(size)
     try:
-        Look(view=view, thickness=thickness, size=pixels or Look.size)
+        look = Look(view=view, thickness=thickness, size=pixels or Look.size)
+        if paper is not None:
+            paper.look(look)
     except InputError as error:
         option = _OPTIONS[error.where]
         raise InputError(error.what, where=option, value=error.value, remedy=error.remedy) from error

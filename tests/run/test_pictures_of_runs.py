@@ -291,6 +291,15 @@ def test_the_options_of_the_command_become_a_wish():
         ({"view": "left"}, "^--view: is no view.*Known: best, top, front, side"),
         ({"size": "0x0"}, "^--size: is too small"),
         ({"size": "9000x200"}, "^--size: is too large"),
+        (
+            {"width_mm": 1000.0},
+            "^--width-mm: 1000 mm at 300 dots an inch make 11811 × 7382.*a smaller one, or fewer",
+        ),
+        (
+            {"width_mm": 180.0, "dpi": 20.0},
+            "^--width-mm: .* make 142 × 89 pixels.*a larger one, or more dots",
+        ),
+        ({"width_mm": 180.0, "size": "0x0"}, "^--size: is too small"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(given, message):

@@ -184,8 +184,18 @@ class Paper:
         return across, round(across * shape[1] / shape[0])
 
     def look(self, look: Look) -> Look:
-        """The look as it is printed, in its proportions."""
-        return replace(look, size=self.size(look.size), dots=self.dots, letters=self.letters)
+        """The look as it is printed, in its proportions. Raises InputError for a width of too few or too many
+        pixels."""
+        across, upward = self.size(look.size)
+        larger = across < SMALLEST[0] or upward < SMALLEST[1]
+        if larger or max(across, upward) > LARGEST:
+            raise InputError(
+                f"{1e3 * self.width:g} mm at {self.dots:g} dots an inch make {across} × {upward} pixels, and pictures "
+                f"have {SMALLEST[0]} × {SMALLEST[1]} or more and at most {LARGEST} a side",
+                where="width",
+                remedy=f"Give a {'larger' if larger else 'smaller'} one, or {'more' if larger else 'fewer'} dots an inch.",
+            )
+        return replace(look, size=(across, upward), dots=self.dots, letters=self.letters)
 
 
 @dataclass(frozen=True)
