@@ -471,7 +471,7 @@ def _read(kind: str, bad: Path, place: Path) -> None:
 
         read_model(bad)
     elif kind == "scan":
-        from shellform.site.scans import read_points
+        from shellform.site.scan_points import read_points
 
         read_points(bad)
     elif kind == "sections":

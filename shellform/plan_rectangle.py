@@ -14,7 +14,7 @@ from shellform.arrays import Reals
 _SMALLER = 0.99  # of the area of the box along the axes: one that is hardly smaller is none
 
 
-def turn_in_plan(points: Reals) -> float:
+def turn_of_plan(points: Reals) -> float:
     """The angle, rad, in [0, π/2), by which the smallest rectangle round points (k, 2 or 3) in plan is turned
     from x and y; 0 where none is smaller by over a hundredth than the box along them, as of round plans."""
     plan = points[:, :2] - points[:, :2].mean(axis=0)
@@ -41,7 +41,7 @@ def longest_side(points: Reals) -> float:
 
 def along_sides(points: Reals) -> Reals:
     """Points (k, 2 or 3) in plan (k, 2) along the sides of the smallest rectangle round them."""
-    turn = turn_in_plan(points)
+    turn = turn_of_plan(points)
     return points[:, :2] if turn == 0.0 else np.asarray(points[:, :2] @ axes_in_plan(turn))
 
 

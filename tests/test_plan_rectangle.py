@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shellform.plan_rectangle import along_sides, axes_in_plan, longest_side, sides_in_plan, turn_in_plan
+from shellform.plan_rectangle import along_sides, axes_in_plan, longest_side, sides_in_plan, turn_of_plan
 
 
 def turned(points, degrees):
@@ -20,7 +20,7 @@ def barrel():
 
 def test_a_plan_along_the_axes_isn_t_turned_by_a_bit_and_its_sides_are_those_of_its_box():
     points = barrel()
-    assert turn_in_plan(points) == 0.0
+    assert turn_of_plan(points) == 0.0
     assert (along_sides(points) == points[:, :2]).all()
     assert sides_in_plan(points).tolist() == np.ptp(points[:, :2], axis=0).tolist()
 
@@ -28,7 +28,7 @@ def test_a_plan_along_the_axes_isn_t_turned_by_a_bit_and_its_sides_are_those_of_
 @pytest.mark.parametrize("degrees", [7.0, 30.0, 45.0, 89.0])
 def test_the_sides_of_a_plan_stay_when_it_is_turned(degrees):
     points = turned(barrel(), degrees)
-    assert np.degrees(turn_in_plan(points)) == pytest.approx(degrees)
+    assert np.degrees(turn_of_plan(points)) == pytest.approx(degrees)
     assert sides_in_plan(points) == pytest.approx([8.0, 3.0])
     assert longest_side(points) == pytest.approx(8.0)
     assert np.ptp(along_sides(points)[:, 0]) == pytest.approx(8.0), "along the turned x"
@@ -36,7 +36,7 @@ def test_the_sides_of_a_plan_stay_when_it_is_turned(degrees):
 
 def test_a_round_plan_lies_along_the_axes_and_a_turned_square_has_its_own_side():
     around = np.linspace(0.0, 2.0 * np.pi, 37)
-    assert turn_in_plan(np.column_stack([np.cos(around), np.sin(around)])) == 0.0
+    assert turn_of_plan(np.column_stack([np.cos(around), np.sin(around)])) == 0.0
     square = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
     assert sides_in_plan(square) == pytest.approx([np.sqrt(2.0)] * 2)
 

@@ -23,7 +23,7 @@ from scipy.spatial import cKDTree
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Gridshell
-from shellform.plan_rectangle import axes_in_plan, turn_in_plan
+from shellform.plan_rectangle import axes_in_plan, turn_of_plan
 
 _SYMMETRIES = ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))  # signs of x and y in two mirrors and the half turn
 _TOLERANCE = 0.02  # of the spacing, within which the image of each cable's end has to lie on another's
@@ -45,7 +45,7 @@ def symmetric_groups(shell: Gridshell) -> Indices:
     tree, reach = cKDTree(places), _TOLERANCE * shell.net.spacing
     count, joined = len(ends), list[Indices]()
     number = {(a, b): k for k, (a, b) in enumerate(np.sort(ends, axis=1).tolist())}
-    for turn, sign in product({0.0, turn_in_plan(shell.net.crossings)}, _SYMMETRIES):
+    for turn, sign in product({0.0, turn_of_plan(shell.net.crossings)}, _SYMMETRIES):
         image = _image(places, shell.net.crossings, axes_in_plan(turn), np.array(sign))
         away, there = tree.query(image)
         if (away > reach).any():

@@ -14,9 +14,7 @@ from shellform.surface.shape import target
 def feet(monkeypatch):
     def found(radius, rest, *, side=8.0, lowest=0.333, spacing=0.5, can_be_cut=True, slopes=False):
         """The plinths of a surface that is bent to a radius, and cut off to the `rest`."""
-        surface = SimpleNamespace(
-            size=np.array([0.5 * side, side, 90.0]), vertices=np.array([[0.0, 5.0, lowest], [9.0, -7.0, 8.0]])
-        )
+        surface = SimpleNamespace(longer_side=side, vertices=np.array([[0.0, 5.0, lowest], [9.0, -7.0, 8.0]]))
 
         def cut_off(own, above):
             if not can_be_cut:
