@@ -21,12 +21,29 @@ def turn_of_plan(points: Reals) -> float:
     try:
         corners = plan[ConvexHull(plan).vertices]
     except QhullError:  # one above the other, or in a row, along which it lies
-        corners = plan[[np.argmin(plan @ _along(plan)), np.argmax(plan @ _along(plan))]]
+        along = plan @ np.linalg.svd(plan, full_matrices=False)[2][0]
+        corners = plan[[np.argmin(along), np.argmax(along)]]
     x, y = (np.roll(corners, -1, axis=0) - corners).T
-    turns = np.unique(np.mod(np.arctan2(y, x), 0.5 * np.pi))
-    areas = np.array([np.ptp(corners @ axes_in_plan(turn), axis=0).prod() for turn in turns])
+    headings = np.mod(np.arctan2(y, x), 2.0 * np.pi)
+    first = int(np.argmin(headings))
+    corners, headings = np.roll(corners, -first, axis=0), np.roll(headings, -first)
+    turns = np.unique(np.mod(headings, 0.5 * np.pi))
+    areas = _extents(corners, headings, turns) * _extents(corners, headings, turns + 0.5 * np.pi)
     least = int(np.argmin(areas))
     return float(turns[least]) if areas[least] < _SMALLER * np.ptp(plan, axis=0).prod() else 0.0
+
+
+def _extents(corners: Reals, headings: Reals, towards: Reals) -> Reals:
+    """How far a convex polygon reaches along each of the directions `towards` (t,), rad, both ways together
+    (t,), m; its sides (h,) run from `corners` (h, 2), counterclockwise, at rising `headings`, rad. Farthest
+    out lies the corner from which sides turn past a right angle to the direction."""
+
+    def reach(direction: Reals) -> Reals:
+        past = np.mod(direction + 0.5 * np.pi, 2.0 * np.pi)
+        there = corners[np.searchsorted(headings, past) % len(corners)]
+        return np.asarray((there * np.column_stack([np.cos(direction), np.sin(direction)])).sum(axis=1))
+
+    return reach(towards) + reach(towards + np.pi)
 
 
 def sides_in_plan(points: Reals) -> Reals:
@@ -49,8 +66,3 @@ def axes_in_plan(turn: float) -> Reals:
     """The unit vectors, columns (2, 2), along x and y turned by so much."""
     c, s = np.cos(turn), np.sin(turn)
     return np.array([[c, -s], [s, c]])
-
-
-def _along(plan: Reals) -> Reals:
-    """The direction (2,) in which points (k, 2) round the origin lie farthest apart."""
-    return np.asarray(np.linalg.svd(plan, full_matrices=False)[2][0])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from shellform.plan_rectangle import along_sides, axes_in_plan, longest_side, sides_in_plan, turn_of_plan
 
@@ -46,3 +47,19 @@ def test_points_in_a_row_and_one_above_the_other_have_sides_too():
     assert sorted(sides_in_plan(row).tolist()) == pytest.approx([0.0, 3.0 * np.sqrt(2.0)])
     above = np.array([[2.0, 5.0, 0.0], [2.0, 5.0, 7.0]])
     assert longest_side(above) == 7.0
+
+
+def test_no_rectangle_along_a_side_of_the_hull_is_smaller():
+    """Each by the reach of all points, for scattered plans of many proportions."""
+    rng = np.random.default_rng(1)
+
+    def area(points, turn):
+        return np.ptp(points @ axes_in_plan(turn), axis=0).prod()
+
+    for _ in range(200):
+        points = rng.normal(size=(rng.integers(4, 60), 2)) * rng.random(2) @ axes_in_plan(3.0 * rng.random())
+        corners = points[ConvexHull(points).vertices]
+        x, y = (np.roll(corners, -1, axis=0) - corners).T
+        least = min(area(points, turn) for turn in np.arctan2(y, x))
+        box = area(points, 0.0)
+        assert area(points, turn_of_plan(points)) == pytest.approx(least if least < 0.99 * box else box)

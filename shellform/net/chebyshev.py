@@ -44,7 +44,6 @@ from shellform.net.pull import (
 from shellform.net.quality import measure, nearness, refuse_distance, refuse_folds
 from shellform.net.refusal import NoNet, Reason
 from shellform.net.trim import FEWEST, Trimmed, Uncovered, bare_rods, trim
-from shellform.plan_rectangle import sides_in_plan
 from shellform.quantities import LENGTHS, MILLIMETRES, if_other_unit
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import dense_on_one
@@ -235,7 +234,7 @@ def _limits(settings: NetSettings) -> NetLimits:
 def require_settings(surface: Surface, settings: NetSettings) -> None:
     """Raises InputError for settings that can't work on this surface."""
     steps, gap = settings.spacings, settings.gap
-    x, y = sides_in_plan(surface.vertices).tolist()
+    x, y = surface.plan_sides.tolist()
     extent, narrow = max(x, y), min(x, y)
     for name, spacing in zip(("net.spacing", "net.spacing_v"), steps, strict=True):
         require_number(

@@ -69,9 +69,14 @@ class Surface(Record):
         return np.asarray(np.ptp(self.vertices, axis=0))
 
     @cached_property
+    def plan_sides(self) -> Reals:
+        """The sides (2,), m, of the smallest rectangle round its plan, nearest to x first."""
+        return reals("plan_sides", sides_in_plan(self.vertices), (2,))
+
+    @property
     def longer_side(self) -> float:
         """The longer side, m, of its plan, however that is turned."""
-        return float(sides_in_plan(self.vertices).max())
+        return float(self.plan_sides.max())
 
     @cached_property
     def boundary(self) -> tuple[Indices, ...]:
