@@ -32,8 +32,8 @@ class Pace:
 
     The first phase has its own pace, and those after it, which draw structures and change from one to the
     other, have one in common, slower by factors; where they have just begun they are taken to go on as the
-    first. What came before the first note and the
-    compiling of loops tell nothing of what follows, and are left out.
+    first. What came before the first note and the compiling of loops tell nothing of what follows, and are
+    left out.
     """
 
     def __init__(self, planned: int, afterwards: int = 0) -> None:

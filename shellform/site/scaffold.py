@@ -290,7 +290,9 @@ class Scaffold:
         aside, middle = grid.layer[nodes], self.ground + 0.5 * grid.gap
         net = self.shell.target.positions[nodes, 2] - aside * upright
         now = np.where(
-            upright >= 0.0, np.sqrt(1.0 - share**2 * (1.0 - upright**2)), np.cos(share * np.arccos(upright))
+            upright >= 0.0,
+            np.sqrt(1.0 - share**2 * (1.0 - upright**2)),
+            np.cos(share * np.arccos(np.clip(upright, -1.0, 1.0))),
         )
         return np.asarray(middle + share * (net - middle) + aside * now)
 

@@ -198,8 +198,8 @@ def _fits(tree: cKDTree, cloud: Reals, markers: Reals, reach: float) -> list[_Fi
 def _worth_trying(fits: Sequence[_Fitted]) -> list[_Fitted]:
     """The best of these, some that are turned otherwise, and the best with other pairs."""
     by_cost = sorted(fits, key=lambda each: each[0])
-    others = (each for each in by_cost if not np.array_equal(each[1], by_cost[0][1]))
-    return _turned_otherwise(by_cost) + [each for each in [next(others, None)] if each is not None]
+    others = [each for each in by_cost if not np.array_equal(each[1], by_cost[0][1])]
+    return _turned_otherwise(by_cost) + others[:1]
 
 
 def _from_one_to_other(one: Motion, other: Motion, cloud: Reals, reach: float) -> str:
